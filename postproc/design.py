@@ -83,18 +83,16 @@ class Work:
 
 def reads_ice(case):
     """Is the ice of a case read, so that it has no concentration to vary?"""
-    ice = case.get("ice")
-    return isinstance(ice, dict) and any(str(ice.get(k, "none")) != "none" for k in ("outlines", "field"))
+    return any(str(says(case, "ice", k) or "none") != "none" for k in ("outlines", "field"))
 
 
 def says(case, section, key):
     """What a case says of a key, None where it says nothing."""
-    return case[section].get(key) if isinstance(case.get(section), dict) else None
+    return case.get(section, {}).get(key)
 
 
 def title_of(case, name, values):
-    run = case.get("run")
-    title = run.get("title") if isinstance(run, dict) else None
+    title = says(case, "run", "title")
     if values:  # that of the case alone is not that of the study
         title = re.sub(r"\b\d+(\.\d+)?\s*% (?=(\w+ ){0,2}ice\b)", "", str(title or ""))
     words = f"ice concentration {100 * min(values):g} to {100 * max(values):g} %" if len(values) > 1 else \
@@ -151,7 +149,7 @@ def run_case(work, a, case):
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on")
     rate = seconds_a_field(Ensemble(a.output)) / work.jobs
-    if not a.no_replay:
+    if not a.no_replay and not reads_ice(case):
         work.end -= seconds_of_the_longest(Ensemble(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
     while whole_round and n < a.fields:

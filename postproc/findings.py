@@ -72,11 +72,9 @@ def read(name, folder):
         return None
 
 
-def chapter(name, folder):
-    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments, or None. None where the
-    command has left nothing."""
-    found, (heading, words) = read(name, folder), KINDS[name]
-    if found is None:
-        return None
+def chapter(name, found):
+    """{"heading", "markdown", "figure"} of what a command found, for a report; figure is a function without arguments,
+    or None."""
+    heading, words = KINDS[name]
     draw = getattr(words, "figure", None)
     return {"heading": heading, "markdown": words.text(found, True), "figure": draw and (lambda: draw(found))}

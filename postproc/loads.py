@@ -99,7 +99,7 @@ def _fields(e, rows, time_scale):
             scale = 0.0 if load.conversion else time_scale
             field = stat_load.field_of(time, x, start, end, scale) if np.isfinite([start, end]).all() else None
             if field is not None and np.ptp(field["peak"]) > 0:
-                out.setdefault(load.name, []).append((load, field))
+                out.setdefault(load.name, []).append((load, field | {"member": int(m)}))
     return {
         name: (some[0][0], [field for _, field in some])
         for name, some in out.items()
@@ -131,10 +131,10 @@ def statistics(e, rows, options):
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
     for name, (load, fields) in _fields(e, rows, options.time_scale or TIME_SCALE / shorter).items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
-        start_up = max((f["start_up"] for f in fields if f["start_up"]), key=lambda found: found["largest"],
-                       default=None)
+        first = max((f for f in fields if f["start_up"]), key=lambda f: f["start_up"]["largest"], default=None)
+        start_up = first and first["start_up"]
         if start_up and name == ALWAYS[0]:
-            start_up = start_up | {"inertia": _inertia(e, rows, start_up["time_s"], fields[0]["scale"])}
+            start_up = start_up | {"inertia": _inertia(e, first["member"], start_up["time_s"], first["scale"])}
         found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
             "label": load.label, "units": load.units, "description": load.description, "conversion": load.conversion,
@@ -149,19 +149,14 @@ def statistics(e, rows, options):
     return out
 
 
-def _inertia(e, rows, end, scale):
-    """Mean of the inertia of the body over the time scale before `end`, N, the largest of the members; NaN where no
-    member's folder is there."""
-    found = []
-    for m in rows:
-        try:
-            with Run(e.folder(m)) as run:
-                some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
-                if "inertia_force" in run and some.any():
-                    found.append(run["inertia_force"][some].mean())
-        except RunError:
-            continue
-    return float(max(found, default=np.nan))
+def _inertia(e, m, end, scale):
+    """Mean of the inertia of a member's body over the time scale before `end`, N; NaN where its folder is not there."""
+    try:
+        with Run(e.folder(m)) as run:
+            some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
+            return float(run["inertia_force"][some].mean()) if "inertia_force" in run and some.any() else np.nan
+    except RunError:
+        return np.nan
 
 
 def panels(e, rows):

@@ -356,6 +356,13 @@ def draw_scatter(e, key):
     return figure
 
 
+def key_beside(figure, axes, notes, step, some):
+    """Legend and notes at the right of the axes; step: one in so many of some conditions is shown."""
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
+    notes = notes + [f"one in {step} of {len(some)} conditions is shown"] * (step > 1)
+    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+
+
 def draw_exceedance(e, options, tails=None):
     """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks.
     tails: fitted tails by the index of their condition, where they are known."""
@@ -397,11 +404,8 @@ def draw_exceedance(e, options, tails=None):
     axes.set_xlabel(f"peak of a collision (N), {conversion}")
     axes.set_ylabel("exceeded (per hour of tow)")
     axes.grid(True)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
-    if step > 1:
-        notes.append(f"one in {step} of {len(some)} conditions is shown")
-    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    key_beside(figure, axes, notes, step, some)
     headline(figure, e, "how often a peak is exceeded")
     return figure
 
@@ -457,17 +461,17 @@ def draw_returns(e, conditions, name):
     what = f"collisions as {first['conversion']}" if first["conversion"] else f"mean over {first['time_scale_s']:.3g} s"
     axes.set_ylabel(f"{first['label']} ({unit}), {what}")
     axes.grid(True)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     d = first["design"]
     notes = ["dots: clusters of the fields together", "lines: tail fitted to them (GPD), dashed",
              "beyond the hours simulated",
              f"diamond, side by side: exceeded with {100 * d['probability']:g} %",
              f"in a tow of {d['tow_hours']:.3g} h; bars: 95 %"]
-    if step > 1:
-        notes.append(f"one in {step} of {len(some)} conditions is shown")
-    if len(some) < len(conditions):
-        notes += [f"{c['label']}: no such tail," for c in conditions if c not in some][:2] + ["not drawn"]
-    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    drawn = {c["label"] for c in some}
+    lacking = [c["label"] for c in conditions if c["label"] not in drawn]
+    if lacking:
+        more = [f"and {len(lacking) - 2} more"] * (len(lacking) > 2)
+        notes += ["without such a tail, not drawn:", *lacking[:2], *more]
+    key_beside(figure, axes, notes, step, some)
     headline(figure, e, f"return levels of {first['label']}")
     return figure
 
@@ -501,11 +505,8 @@ def draw_above(e, conditions, name):
                      f"mean over {first['time_scale_s']:.3g} s"))
     axes.set_ylabel("share of the time above (%)")
     axes.grid(True)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     notes = ["from the median of a condition to the", "largest value simulated; band: 95 % over fields"]
-    if step > 1:
-        notes.append(f"one in {step} of {len(some)} conditions is shown")
-    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    key_beside(figure, axes, notes, step, some)
     headline(figure, e, f"share of the time above a level of {first['label']}")
     return figure
 

@@ -150,9 +150,8 @@ def answer(e, s, case, results):
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
-    beyond = report_method.beyond({name: found for name, (_, found) in results.items()})
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(case, s) + beyond}] if case else []
+             "rows": report_method.holds(case, s) + report_method.beyond(results)}] if case else []
     return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
 
 
@@ -167,7 +166,7 @@ def governing(s):
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
     value = worth(d["value"], *d["interval_95"])[0]
-    said = (f"Largest of these: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE, 2)} "
+    said = (f"Largest of these: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE)} "
             f"tonne-force); upper end of its interval {both(d['interval_95'][1])}")
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
@@ -307,15 +306,10 @@ NOT_STUDIED = {
 
 
 def results_beside(folders):
-    """{name: (the folder, what a command of findings.py left there)}, of the first folder that has it."""
-    out = {}
-    for name in findings.KINDS:
-        for folder in folders:
-            found = findings.read(name, folder)
-            if found is not None:
-                out[name] = folder, found
-                break
-    return out
+    """{name: what a command of findings.py left in the first of the folders that has it}."""
+    found = {name: next((f for f in (findings.read(name, folder) for folder in folders) if f is not None), None)
+             for name in findings.KINDS}
+    return {name: f for name, f in found.items() if f is not None}
 
 
 def beside(results):
@@ -323,7 +317,7 @@ def beside(results):
     out = []
     for name, (heading, _) in findings.KINDS.items():
         if name in results:
-            out.append(of_part(name, findings.chapter(name, results[name][0])))
+            out.append(of_part(name, findings.chapter(name, results[name])))
         elif name in NOT_STUDIED:
             out.append((heading, [lines(NOT_STUDIED[name])]))
     return out
@@ -355,7 +349,7 @@ def ranges(results):
     """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what
     the program admits."""
     out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
-    for key, given in (results["budget"][1]["assumed"] if "budget" in results else {}).items():
+    for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
     return out
 

@@ -17,6 +17,7 @@ typedef struct bt_roster {
     double *thickness;      ///< [n bodies] m; draft + sail of the towed body, 0 for walls
     const char **names;     ///< [n bodies − n_floes]
     double mean_size;       ///< mean equivalent diameter of the floes, m
+    bt_idx n_free;          ///< floes generated or read, which move freely; those given by hand may be fixed
 } bt_roster;
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:

@@ -137,7 +137,7 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     double *force = bt_alloc((size_t)b->n, sizeof *force);
     double (*net)[2] = bt_alloc((size_t)b->n, sizeof *net);
     bt_observe_contact_force(w, force);
-    bt_observe_net_force(c, w, roster->n_floes, net);
+    bt_observe_net_force(c, w, roster->n_free, net);
     list l = make_list(c, w, roster);
     bt_frame_row *rows = bt_alloc((size_t)l.n, sizeof *rows), *block = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {

@@ -296,10 +296,10 @@ void bt_observe_contact_force(const bt_world *w, double *force)
     bt_domain_largest(w, force);
 }
 
-void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_floes, double (*force)[2])
+void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, double (*force)[2])
 {
     const bt_bodies *b = &w->bodies;
-    const int others = (int)(b->n_global - n_floes);
+    const int others = (int)(b->n_global - n_free);
     bt_sum *sum = bt_alloc(2 * (size_t)others, sizeof *sum);
     for (bt_idx k = 0; k < w->cells->n; k++) {
         const bt_cell *cell = &w->cells->cell[k];
@@ -309,7 +309,7 @@ void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_floes, d
             impulse_on_b(u, &jx, &jy);
             const bt_idx side[] = {u->a, u->b};
             for (int s = 0; s < 2; s++) {
-                const bt_gid other = b->gid[side[s]] - n_floes;
+                const bt_gid other = b->gid[side[s]] - n_free;
                 if (other < 0) continue;
                 bt_sum_add(&sum[2 * other], s ? jx : -jx);
                 bt_sum_add(&sum[2 * other + 1], s ? jy : -jy);
@@ -318,11 +318,11 @@ void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_floes, d
     }
     bt_comm_reduce(c, sum, 2 * others, NULL, 0, NULL, 0);
     for (bt_idx i = 0; i < b->n; i++) {
-        const bt_gid other = b->gid[i] - n_floes;
+        const bt_gid other = b->gid[i] - n_free;
         const double m = b->inv[i].m;
         if (other >= 0) {
             for (int k = 0; k < 2; k++) force[i][k] = bt_sum_value(&sum[2 * other + k]) / w->par.dt;
-        } else { // 0: no step has been taken
+        } else { // m is 0 until a step has been taken
             force[i][0] = m > 0 ? (b->vel[i].x - b->vel_free[i].x) / m / w->par.dt : 0;
             force[i][1] = m > 0 ? (b->vel[i].y - b->vel_free[i].y) / m / w->par.dt : 0;
         }

@@ -428,7 +428,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
-    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size};
+    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size, .n_free = f->n};
     r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
     r->names = bt_alloc(5, sizeof *r->names);
     add_field(c, f, w, r);

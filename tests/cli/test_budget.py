@@ -186,7 +186,7 @@ def test_a_study_end_to_end(small):
         levels.append(np.percentile(np.convolve(some, np.full(n, 1 / n), "valid"), 99))
     assert len(levels) == 24 and tail["mean"] == pytest.approx(np.mean(levels), rel=1e-9)
     assert tail["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(np.reshape(levels, (12, 2)), axis=1, ddof=1)))
-    block = findings.chapter("budget", folder / "out")
+    block = findings.chapter("budget", findings.read("budget", folder / "out"))
     assert block["markdown"].startswith("| part |") and len(block["figure"]().axes) == 2
     (folder / "converge.json").write_text(json.dumps({"rows": [{"name": "dt", "interval_95": [-0.1, 0.2]}]}))
     again = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--converge", "converge.json"], cwd=folder,

@@ -230,7 +230,7 @@ class made_up_run:
 
 
 def test_its_block_for_a_report(tmp_path):
-    assert findings.chapter("capability", tmp_path) is None
+    assert findings.read("capability", tmp_path) is None
     point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 1, "speed": [0.4, 0.5], "mean_speed": 0.45,
              "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
              "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
@@ -243,7 +243,7 @@ def test_its_block_for_a_report(tmp_path):
              "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = findings.chapter("capability", tmp_path)
+    block = findings.chapter("capability", findings.read("capability", tmp_path))
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     axes = block["figure"]().axes
@@ -251,6 +251,7 @@ def test_its_block_for_a_report(tmp_path):
     for row in rows:
         row["estimate"] = None
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    assert len(findings.chapter("capability", tmp_path)["figure"]().axes) == 2  # no limit, no panel of it
+    block = findings.chapter("capability", findings.read("capability", tmp_path))
+    assert len(block["figure"]().axes) == 2  # no limit, no panel of it
     assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3

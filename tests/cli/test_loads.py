@@ -132,14 +132,17 @@ def test_a_correlated_signal_of_few_clusters_has_no_tail():
 # ---- ensembles
 
 N = 2000
+LOADED = "tow_force", "ice_resistance", "line_tension_1", "line_tension_2"
 SERIES = {
     "tow_force": {"units": "N", "description": "towing force", "label": "tow force", "role": "balance", "order": 1},
     "ice_resistance": {"units": "N", "description": "ice", "label": "ice resistance", "role": "balance", "order": 2},
     "line_tension_1": {"units": "N", "description": "first branch", "label": "line tension", "role": "load",
                        "order": 3},
-    "vessel_thrust": {"units": "N", "description": "thrust", "label": "vessel thrust", "role": "load", "order": 4},
-    "largest_push": {"units": "N", "description": "push", "label": "", "role": "", "order": 5},
-    "impact_peak": {"units": "N", "description": "peak", "label": "", "role": "", "order": 6},
+    "line_tension_2": {"units": "N", "description": "second branch", "label": "tension of the second branch",
+                       "role": "load", "order": 4},
+    "vessel_thrust": {"units": "N", "description": "thrust", "label": "vessel thrust", "role": "load", "order": 5},
+    "largest_push": {"units": "N", "description": "push", "label": "", "role": "", "order": 6},
+    "impact_peak": {"units": "N", "description": "peak", "label": "", "role": "", "order": 7},
 }
 CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load} N\nice:\n  thickness: 1 m\n"
         "  crushing:\n    pressure: {pressure} Pa\n")
@@ -154,6 +157,7 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
             x[:30] = jerk
             warned = ["domain.width: 15 body widths"] if a > 0.8 else []
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
+                      "line_tension_2": (0.98 + 0.05 * c) * x,
                       "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
                       "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
             members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, warnings=warned,
@@ -172,9 +176,9 @@ def statement(tmp_path_factory):
 
 def test_every_load_is_there_with_its_unit_and_without_the_start(statement):
     _, _, s = statement
-    for c, mean in zip(s["conditions"], (1e6, 3e6)):
-        assert list(c["loads"]) == ["tow_force", "ice_resistance", "line_tension_1", "floe_force"]  # no vessel
-        for name, factor in (("tow_force", 1.0), ("ice_resistance", 0.9), ("line_tension_1", 1.01)):
+    for k, (c, mean) in enumerate(zip(s["conditions"], (1e6, 3e6))):
+        assert list(c["loads"]) == [*LOADED, "floe_force"]  # no vessel
+        for name, factor in zip(LOADED, (1.0, 0.9, 1.01, 0.98 + 0.05 * k)):
             x = c["loads"][name]
             assert x["units"] == "N" and x["label"] == SERIES[name]["label"] and x["time_scale_s"] == 30
             low, high = x["mean"]["interval_95"]
@@ -186,6 +190,14 @@ def test_every_load_is_there_with_its_unit_and_without_the_start(statement):
         floe = c["loads"]["floe_force"]
         assert floe["conversion"] == "half-sine of 0.1 s" and floe["time_scale_s"] == 1
         assert 1e5 < floe["largest"] < 1e6  # a push of 1e5 at least, or the peak of a collision
+
+
+def test_the_branch_that_bears_more_is_designed_for(statement):
+    first, second = ({name: c["loads"][name]["design"]["value"] for name in LOADED[2:]}
+                     | {"said": c["design"]["tension"]} for c in statement[2]["conditions"])
+    assert first["said"]["label"] == "line tension" and first["said"]["value"] == first["line_tension_1"]
+    assert second["said"]["label"] == "tension of the second branch"
+    assert second["said"]["value"] == second["line_tension_2"] > second["line_tension_1"]
 
 
 def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):

@@ -24,7 +24,7 @@ from ensemble_read import Ensemble  # noqa: E402
 
 N = 4
 VESSEL = changed(TOW, run={"dt": 0.05, "duration": 40}, domain={"length": 30, "width": 10},
-                 ice={"concentration": 0.6, "size": 1, "x_max": 25, "restitution": 0.2},
+                 ice={"concentration": 0.6, "size": 1, "x_max": 25.9, "restitution": 0.2},
                  body={"x": 27, "length": 2, "y": 0.3},
                  tow={"mode": "thrust", "speed": 0.3, "ramp": 5, "direction": 180, "line_length": 3,
                       "line_stiffness": 2000, "line": {"branches": 2}, "vessel": {
@@ -85,24 +85,15 @@ def test_a_load_is_that_of_the_series(towed, name):
 
 def test_what_inertia_takes_of_the_start(towed):
     e, s = towed
-    start, found = s["conditions"][0]["loads"]["tow_force"]["start_up"], []
+    start, found = s["conditions"][0]["loads"]["tow_force"]["start_up"], {}
     for m in range(N):
         with h5py.File(e.folder(m) / "result.h5") as f:
-            t, x = f["series/time"][:], f["series/inertia_force"][:]
-        found.append(x[(t > start["time_s"] - SCALE + 1e-9) & (t <= start["time_s"] + 1e-9)].mean())
-    assert start["inertia"] == pytest.approx(max(found), rel=1e-9) and start["time_s"] < 12
-
-
-def test_the_branch_that_bears_more_is_designed_for(towed):
-    e, s = towed
-    c = s["conditions"][0]
-    tension = c["design"]["tension"]
-    if tension is None:
-        assert all("refused" in c["loads"][name]["design"] for name in statement.TENSIONS)
-    else:
-        values = {c["loads"][name]["label"]: c["loads"][name]["design"].get("value", -np.inf)
-                  for name in statement.TENSIONS}
-        assert tension["label"] == max(values, key=values.get) and tension["value"] == max(values.values())
+            t, tow, inertia = (f[f"series/{n}"][:] for n in ("time", "tow_force", "inertia_force"))
+        some = (t > start["time_s"] - SCALE + 1e-9) & (t <= start["time_s"] + 1e-9)
+        found[tow[some].mean()] = inertia[some].mean()
+    assert start["time_s"] < 12 and start["largest"] == pytest.approx(max(found), rel=1e-9)
+    assert start["inertia"] == pytest.approx(found[max(found)], rel=1e-9)
+    assert len({round(v, 6) for v in found.values()}) > 1  # or any member's would do
 
 
 def test_tables_pictures_and_answer_have_them(towed):

@@ -232,7 +232,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0",
                                                       "run.title": ""})
-        assert report_ensemble.ranges({"budget": (folder, found["budget"])}) == {
+        assert report_ensemble.ranges({"budget": found["budget"]}) == {
             "ice.friction": ("uniform from 0 to 1", "a book"), "ice.size": ("above 0", "admitted")}
     for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
                   "width", sd):

@@ -159,8 +159,10 @@ def test_the_printed_table_says_the_same(run):
 
 
 def test_forces_of_a_frame_balance(tmp_path):
-    """Red: an impulse that is counted for one of two bodies, or of a line for one of a contact."""
-    write_case(tmp_path, changed(TWO_LINES, domain__length=10, ice__concentration=0.75))
+    """Red: an impulse that is counted for one of two bodies, or of a line for one of a contact; a fixed floe that has
+    no force since it gains no momentum."""
+    pier = {"x": 7.2, "y": 0, "shape": "square", "length": 0.8, "thickness": 1, "fixed": True}
+    write_case(tmp_path, changed(TWO_LINES, domain__length=10, ice__concentration=0.75, floes=[pier]))
     done = subprocess.run([BERGTOW, "run", "case.yml", "-o", "out", "--quiet", "--threads", "1"], cwd=tmp_path,
                           env=environment(), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -171,6 +173,7 @@ def test_forces_of_a_frame_balance(tmp_path):
         np.testing.assert_array_equal(force[f["frames/contact_force"][1:].sum(axis=1) == 0], 0)
     scale = np.abs(force).sum(axis=(1, 2))
     assert (resistance > 0).sum() > 5 and (force[:, towed + 1:] != 0).any()
+    assert (force[:, towed - 1] != 0).any()  # the pier, the last of the floes
     np.testing.assert_allclose(-force[:, towed, 0], resistance, atol=1e-6 * scale.max())
     np.testing.assert_array_less(np.abs(force.sum(axis=1)).max(axis=1), 1e-5 * scale + 1e-9)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The verdicts of `bergtow converge` that the READMEs of the cases report: the basin at 50 % is resolved throughout but
 for its walls, and rigid ice at 90 % at full scale is found to be made by the width of the domain and by the start,
-without being told (make test-long; 20 min on two quiet cores, which the budgets bound to 75)."""
+without being told (make test-long; the budgets bound it to 75 min)."""
 import json
 import subprocess
 

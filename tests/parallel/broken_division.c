@@ -15,28 +15,14 @@
 #include "bergtow/shape.h"
 #include "partition/division.h"
 #include "partition/domain.h"
+#include "tests/parallel/squares.h"
 
 static bt_world *make_world(void)
 {
-    const bt_params p = {.dt = 0.1,
-                         .tolerance = 1e-6,
-                         .max_sweeps = 100,
-                         .warm_start = true,
-                         .slop = 1e-3,
-                         .position_sweeps = 50,
-                         .rest_speed = 1e-3,
-                         .size = 1};
-    bt_world *w = bt_world_create(&p);
-    double v[8] = {-0.4, -0.4, 0.4, -0.4, 0.4, 0.4, -0.4, 0.4};
+    bt_world *w = squares_world();
     for (int k = 0; k < 600; k++) {
-        const bt_body_def d = {.motion = BT_DYNAMIC,
-                               .n_vertices = 4,
-                               .vertices = v,
-                               .x = 0.5 + k % 30,
-                               .y = 0.5 + k / 30,
-                               .vx = k % 7 == 0,
-                               .mass = 50,
-                               .inertia = 6};
+        bt_body_def d = square_at(0.5 + k % 30, 0.5 + k / 30);
+        d.vx = k % 7 == 0;
         bt_world_add(w, &d);
     }
     return w;

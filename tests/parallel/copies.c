@@ -13,6 +13,7 @@
 #include "contact/contacts.h"
 #include "partition/division.h"
 #include "partition/domain.h"
+#include "tests/parallel/squares.h"
 
 enum { ALONG = 24, ACROSS = 12, STEPS = 300 };
 
@@ -20,30 +21,15 @@ enum { ALONG = 24, ACROSS = 12, STEPS = 300 };
 /// x and y, where others hold the floes that it meets.
 static bt_world *make_world(void)
 {
-    const bt_params p = {.dt = 0.1,
-                         .tolerance = 1e-6,
-                         .max_sweeps = 100,
-                         .warm_start = true,
-                         .slop = 1e-3,
-                         .position_sweeps = 50,
-                         .rest_speed = 1e-3,
-                         .size = 1};
-    bt_world *w = bt_world_create(&p);
-    double v[8] = {-0.4, -0.4, 0.4, -0.4, 0.4, 0.4, -0.4, 0.4}, disc[2 * 12];
+    bt_world *w = squares_world();
+    double disc[2 * BT_MAX_VERTICES];
     for (int k = 0; k < ALONG * ACROSS; k++) {
         const double x = 3.0 * (k % ALONG), y = 3.0 * (k / ALONG);
         if (hypot(x - 55, y - 24) < 3) continue;
         const bool flies = k % 31 == 0;
-        const bt_body_def d = {.motion = BT_DYNAMIC,
-                               .n_vertices = 4,
-                               .vertices = v,
-                               .x = x,
-                               .y = y,
-                               .vx = flies ? 1.2 * cos(k) : 0,
-                               .vy = flies ? 1.2 * sin(k) : 0,
-                               .mass = 50,
-                               .inertia = 6,
-                               .drag = {.water_skin = 2}};
+        bt_body_def d = square_at(x, y);
+        d.drag.water_skin = 2;
+        if (flies) d.vx = 1.2 * cos(k), d.vy = 1.2 * sin(k);
         bt_world_add(w, &d);
     }
     const int n = bt_shape_named("disc", 4, 4, disc);
