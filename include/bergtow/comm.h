@@ -39,8 +39,9 @@ extern const bt_comm bt_comm_alone;
 /// any MPI, srun) started this process: a plain start must neither pay for MPI_Init nor need a network. BERGTOW_MPI=yes
 /// or no in the environment decides instead. From here on an error of MPI ends all ranks, and so does an exit() of one
 /// rank alone where MPI was started here; an exit(0) or exit(BT_ERR_USAGE) is taken for one of all ranks, since they
-/// have the same command line. argc, argv may be NULL. Errors: BT_ERR_USAGE, with a message on stderr; also where the
-/// launcher has started several processes and MPI knows of one.
+/// have the same command line (with glibc; other C libraries do not tell the code, and there any exit ends all ranks).
+/// argc, argv may be NULL. Errors: BT_ERR_USAGE, with a message on stderr; also where the launcher has started several
+/// processes and MPI knows of one.
 bt_status bt_comm_start(int *argc, char ***argv);
 
 /// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst
