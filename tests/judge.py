@@ -158,6 +158,8 @@ def judge(case, folder, checked, ran):
             wrong.append(f"exit code 5 without failure.h5: {ran.stderr}")
         if (folder / "summary.json").exists():
             wrong.append("exit code 5 and a summary")
+        if not (folder / "result.h5").exists():
+            return wrong + [f"exit code 5 without a result: {ran.stderr}"]
     return wrong + judge_result(case, folder, ran.returncode == 0)
 
 

@@ -208,6 +208,30 @@ def test_a_field_is_random(tmp_path):
     assert 1.3 < ratio < 1.5 < 1.65 < regular, (ratio, regular)
 
 
+STUCK = {
+    "run": {"dt": 0.03, "duration": 1},
+    "domain": {
+        "frame": "geographic", "ends": "periodic", "sides": "periodic", "length": 4.78216, "width": 2.24407,
+        "x0": -2.39108
+    },
+    "body": {"shape": "square", "length": 0.444059, "x": 0, "y": 0.115599, "draft": 0.0341709},
+    "tow": {"mode": "none"},
+    "ice": {
+        "size": 0.28535, "thickness": 0.01, "concentration": 0.707949, "shape": "rectangles", "aspect": 1.65423,
+        "size_spread": 0.0479512, "seed": 385030
+    },
+}
+
+
+def test_floes_that_a_shake_leaves_in_one_another_fly_on(tmp_path):
+    """Found by random_cases.py: floe 51 of this field is still in another when all are at rest."""
+    f = Field(make(tmp_path, STUCK))
+    ground = 4.78216 * 2.24407 - 0.444059 ** 2
+    assert f.area.sum() == pytest.approx(0.707949 * ground, rel=5e-3)
+    shifts = [np.array([i * 4.78216, k * 2.24407]) for i in (-1, 0, 1) for k in (-1, 0, 1)]
+    assert max(overlap(p, q + s) for i, p in enumerate(f.world) for q in f.world[:i] for s in shifts) <= 1e-9
+
+
 def test_what_cannot_be_made_or_written_is_refused(tmp_path):
     case = write_case(tmp_path, BASE)
     missing = call("field", case, "-o", tmp_path / "no/such/field.h5")
