@@ -285,7 +285,8 @@ test: deps-test ## every test: units, known answers, same bits, command line, sh
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
 test-long: deps-test ## tests that take minutes: intervals over fields, long tows, finer steps, kills, faults, soak
-	@$(AGAIN) all
+	@$(AGAIN) all lib tests
+	@$(AGAIN) CONFIG=asan all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help

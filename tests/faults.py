@@ -20,7 +20,6 @@ from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, RANK, SIGNAL, changed, en
 
 CALLS = FAULT.with_name("calls.so")  # tests/fault/calls.c
 MEMORY = FAULT.with_name("memory.so")  # tests/fault/memory.c
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 HANGS = 60  # seconds after which a run of a tenth of one hangs
 
 # Two checkpoints on the way, collisions, panels; as few floes and frames as show that.
@@ -57,7 +56,7 @@ Call = collections.namedtuple("Call", "name path second result")
 
 
 def shim(under, **more):
-    return environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, LD_PRELOAD=CALLS, BT_CALLS_UNDER=under, **ROOT, **more)
+    return environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, LD_PRELOAD=CALLS, BT_CALLS_UNDER=under, **more)
 
 
 def started(words, env, cwd=None):
@@ -74,7 +73,7 @@ def started(words, env, cwd=None):
 
 
 def plain(*words):
-    return started([BERGTOW, *words], environment(OMP_NUM_THREADS=1, **ROOT))
+    return started([BERGTOW, *words], environment(OMP_NUM_THREADS=1))
 
 
 def logged(path):

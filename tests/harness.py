@@ -80,7 +80,8 @@ def environment(**extra):
     """
     theirs = "OMPI_", "PMIX_", "PMI_", "SLURM_", "BERGTOW_MPI", "OMP_"
     kept = {k: v for k, v in os.environ.items() if not k.startswith(theirs)}
-    return kept | {"OMP_WAIT_POLICY": "passive"} | {k: str(v) for k, v in extra.items()}
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # as which containers run tests
+    return kept | {"OMP_WAIT_POLICY": "passive"} | root | {k: str(v) for k, v in extra.items()}
 
 
 def launcher(ranks, *options):

@@ -101,8 +101,7 @@ def limited(seconds):
 
 def run(words, tree, seconds, processor=None):
     """Exit code and output; a group that hangs is killed whole, and counts as failed."""
-    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1, GOMP_SPINCOUNT=5000,
-                      BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none")
+    env = environment(GOMP_SPINCOUNT=5000, BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none")
     del env["OMP_WAIT_POLICY"]  # as tests/run.sh has it: threads that sleep do not race
     p = subprocess.Popen(words, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
                          start_new_session=True, env=env, preexec_fn=processor and (lambda: limited(processor)))

@@ -11,7 +11,6 @@ import numpy as np
 
 from harness import BERGTOW, DONE, Run, changed, differing, environment, launcher, write_case
 
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 # A bridle whose second branch breaks, way-points, collisions, panel loads, samples of three steps, floes that go from
 # rank to rank. Checkpoints so often that most kills fall into the writing of one.
 CASE = {
@@ -46,7 +45,7 @@ def started(ranks, *arguments, cwd=None, stderr=subprocess.PIPE):
     """In a process group of its own, so that all of it can be killed at once."""
     return subprocess.Popen(command(ranks, *arguments),
                             cwd=cwd,
-                            env=environment(OMP_NUM_THREADS=1, **ROOT),
+                            env=environment(OMP_NUM_THREADS=1),
                             stdout=subprocess.PIPE,
                             stderr=stderr,
                             text=True,

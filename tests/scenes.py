@@ -202,7 +202,7 @@ class Failed(Exception):
 
 def started(binary, ranks, folder, *arguments):
     mpi = launcher(ranks) if ranks > 1 else []
-    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    env = environment()
     done = subprocess.run([*mpi, str(binary), *map(str, arguments)], cwd=folder, env=env, capture_output=True,
                           text=True, timeout=PATIENCE)
     if done.returncode != 0:

@@ -75,7 +75,7 @@ class Reader:
 
     def run(self, text):
         self.exported |= dict(re.findall(r"^export (\w+)=(\S+)$", text, re.M))
-        env = environment(HOME=self.home, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1,
+        env = environment(HOME=self.home,
                           OMPI_MCA_rmaps_base_oversubscribe=1, MPLCONFIGDIR=self.home, PYTHONDONTWRITEBYTECODE=1)
         before = "".join(f"export {name}={value}\n" for name, value in self.exported.items())
         done = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", before + text], cwd=self.folder,

@@ -166,6 +166,7 @@ def test_what_a_condition_reads_is_looked_at(tmp_path):
 
 def test_options_of_a_case_are_refused(tmp_path):
     assert "is a study, and --scale is for a case" in checked(tmp_path, STUDY, USAGE, "--scale", "30")[0]
+    assert "is a study, and --json is for a case" in checked(tmp_path, STUDY, USAGE, "--json")[0]
 
 
 @pytest.mark.parametrize("command", ["run", "field", "estimate"])
@@ -187,7 +188,7 @@ def test_a_case_in_a_pipe_is_still_read(tmp_path):
 
 def test_under_mpirun_it_is_said_once(tmp_path):
     alone = checked(tmp_path, STUDY)
-    env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    env = environment(OMP_NUM_THREADS=1)
     for study, code in (STUDY, DONE), (STUDY | {"base": "none.yml"}, IO):
         checked(tmp_path, study, code)
         result = subprocess.run([*launcher(2), BERGTOW, "check", "study.yml"],
@@ -204,7 +205,7 @@ def test_under_mpirun_it_is_said_once(tmp_path):
 
 
 def under(ranks, *arguments, cwd):
-    env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    env = environment(OMP_NUM_THREADS=1)
     return subprocess.run([*launcher(ranks), BERGTOW, *arguments],
                           cwd=cwd, env=env, capture_output=True, text=True, timeout=60)
 

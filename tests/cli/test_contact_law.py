@@ -21,7 +21,6 @@ import resuming
 from harness import BERGTOW, CASE, DONE, ROOT, TOW, call, changed, differing, environment, launcher, write_case
 
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 FENDER = {"load": "8 N", "stiffness": "300 N/m"}
 SPEED = changed(TOW, run__duration=30, output__window_start=6, ice__concentration=0.6, fender=FENDER)
 WINDOW = {
@@ -35,7 +34,7 @@ WINDOW = {
 
 def started(*arguments, ranks=1, threads=1, cwd=None, code=DONE):
     line = [*(launcher(ranks) if ranks > 1 else []), EXTENDED, *map(str, arguments)]
-    done = subprocess.run(line, cwd=cwd, env=environment(OMP_NUM_THREADS=threads, **MPI), capture_output=True,
+    done = subprocess.run(line, cwd=cwd, env=environment(OMP_NUM_THREADS=threads), capture_output=True,
                           text=True, timeout=200)
     assert done.returncode == code, done.stderr
     return done

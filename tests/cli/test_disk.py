@@ -9,7 +9,6 @@ import pytest
 
 from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, launcher, write_case
 
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 WITHIN = 0.2
 SHORT = changed(TOW, run__duration=10)
 UNIT = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
@@ -42,7 +41,7 @@ def said(text, words):
 def run(folder, path, ranks, *more):
     command = launcher(ranks) if ranks > 1 else []
     result = subprocess.run([*command, BERGTOW, "run", path, "-o", folder, "--threads", "1", "--quiet", *more],
-                            env=environment(OMP_NUM_THREADS=1, **MPI),
+                            env=environment(OMP_NUM_THREADS=1),
                             capture_output=True,
                             text=True,
                             timeout=120)
@@ -76,7 +75,7 @@ def test_of_a_field_that_is_read(tmp_path, ranks):
 def test_under_mpirun_the_estimate_is_of_these_ranks(tmp_path):
     path = write_case(tmp_path, CASES["dense"])
     several = subprocess.run([*launcher(2), BERGTOW, "check", path],
-                             env=environment(OMP_NUM_THREADS=1, **MPI),
+                             env=environment(OMP_NUM_THREADS=1),
                              capture_output=True,
                              text=True,
                              timeout=60)

@@ -17,7 +17,6 @@ from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differi
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
          "parameters": {"ice.concentration": [0.2, 0.5], "tow.speed": {"from": "0.1 m/s", "to": "0.2 m/s", "n": 2}}}
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 
 
 def prepare(folder, study=STUDY, base=BASE):
@@ -161,7 +160,7 @@ def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
     result = subprocess.run(
         [*launcher(3), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
         cwd=tmp_path / "mpi",
-        env=environment(OMP_NUM_THREADS=1, **ROOT),
+        env=environment(OMP_NUM_THREADS=1),
         capture_output=True,
         text=True,
         timeout=180)

@@ -16,7 +16,6 @@ from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differi
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"base": "base.yml", "repeats": 2, "parameters": {"tow.speed": [0.1, 0.15]}}
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 
 
 def ensemble(folder, *more, **how):
@@ -27,7 +26,7 @@ def on_two_ranks(folder):
     return subprocess.run(
         [*launcher(2), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
         cwd=folder,
-        env=environment(OMP_NUM_THREADS=1, **ROOT),
+        env=environment(OMP_NUM_THREADS=1),
         capture_output=True,
         text=True,
         timeout=180)

@@ -344,7 +344,7 @@ def test_no_regular_file_is_opened(tmp_path, what, kind):
 def test_nobody_hangs_under_mpirun(tmp_path):
     os.mkfifo(tmp_path / "field.h5")
     path = write_case(tmp_path, READ)
-    env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    env = environment(OMP_NUM_THREADS=1)
     result = subprocess.run([*launcher(2), BERGTOW, "run", path, "-o", tmp_path / "out"],
                             env=env, capture_output=True, text=True, timeout=60)
     assert result.returncode == IO and result.stderr.count("is a pipe (FIFO)") == 1

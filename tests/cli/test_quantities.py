@@ -39,7 +39,6 @@ from bergtow_read import Run  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
-MPI = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 SPEED = changed(TOW, run__duration=12, output__window_start=4, tow__ramp=8)
 #: cases, and what each has of "with a ..." and "where ..."
 LINE = {
@@ -68,7 +67,7 @@ def started(program, *arguments, ranks=1, cwd=None, timeout=200):
     line = [*(launcher(ranks) if ranks > 1 else []), program, *map(str, arguments)]
     done = subprocess.run(line,
                           cwd=cwd,
-                          env=environment(OMP_NUM_THREADS=1, **MPI),
+                          env=environment(OMP_NUM_THREADS=1),
                           capture_output=True,
                           text=True,
                           timeout=timeout)

@@ -186,7 +186,7 @@ TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, 
 def test_the_line_of_a_run_that_goes_on(tmp_path, ranks):
     write_case(tmp_path, TWO_LINES)
     mpi = launcher(ranks) if ranks > 1 else []
-    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    env = environment()
     for words in (["run", "case.yml", "-o", "parts", "--steps", "33"], ["resume", "parts"],
                   ["run", "case.yml", "-o", "whole"]):
         done = subprocess.run([*(mpi if "parts" in words else []), BERGTOW, *words, "--quiet", "--threads", "1"],

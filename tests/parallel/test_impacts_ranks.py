@@ -9,7 +9,6 @@ from counted import assert_counted_over_the_window
 from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, launcher, run
 from resuming import assert_same_result, done
 
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
 # A body of infinite mass, whose contacts lie in the tiles of the floes, and a free one, whose contacts are one rank's.
 # The first is broad and in many tiles: it hits several floes in a step, found by several threads and ranks.
@@ -37,7 +36,7 @@ def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
         str(threads)
     ],
                             cwd=folder,
-                            env=environment(**ROOT),
+                            env=environment(),
                             capture_output=True,
                             text=True,
                             timeout=100)

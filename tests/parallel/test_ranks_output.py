@@ -23,7 +23,6 @@ SHORT = changed(TOW,
                        {"shape": "rectangle", "length": 0.9, "width": 0.5, "x": 14, "y": -3.5, "fixed": True}])
 # Some seconds long, with all but free steps, so that there is a middle of the run to strike at.
 LONG = changed(TOW, run__dt=0.0002, output__frame_interval=0.1)
-ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 
 
 def described(dataset):
@@ -38,7 +37,7 @@ def command(ranks, *arguments):
 
 def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, **more):
     return subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
-                          env=environment(OMP_NUM_THREADS=1, **ROOT),
+                          env=environment(OMP_NUM_THREADS=1),
                           capture_output=True,
                           text=True,
                           timeout=timeout,
@@ -212,7 +211,7 @@ def start(tmp_path):
         write_case(tmp_path, LONG)
         p = subprocess.Popen(command(3, BERGTOW, "run", "case.yml", "-o", "out", "--threads", 1),
                              cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1, **ROOT),
+                             env=environment(OMP_NUM_THREADS=1),
                              stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE,
                              text=True)
