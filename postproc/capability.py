@@ -44,6 +44,8 @@ class Trial:
     parted: bool
     tow_force: float  #: N, mean
     tension: float    #: N, largest step mean of the window
+    widths: float = np.nan  #: of the domain in body widths
+    needed: float = np.nan  #: those that the ice asks for, NaN where it asks for none
 
     def made(self, least):
         return self.speed >= least and not self.parted
@@ -56,9 +58,11 @@ def trial(run, number):
     speed = run.speed_made_good
     if not np.isfinite(speed):
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
+    domain = run.summary.get("domain") or {}
+    widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
     return Trial(number, speed,
                  any(e["kind"] == "line_broken" for e in run.summary.get("events") or []),
-                 run.number("mean_tow_force_n"), run.number("peak_line_tension_n"))
+                 run.number("mean_tow_force_n"), run.number("peak_line_tension_n"), widths, needed)
 
 
 @dataclass
@@ -144,7 +148,8 @@ def row_of(c, value, least):
     """Numbers of a value of a condition."""
     some = c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
-           "parted": sum(t.parted for t in some), "failed": len(c.failed[value])}
+           "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
+           "body_widths": some[0].widths, "body_widths_needed": some[0].needed}
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
         out[name] = x.tolist()

@@ -64,8 +64,22 @@ def meaning(found):
             f"{found['grid_runs']}.{more}")
 
 
+def narrow(found):
+    """Where the domain is too narrow for its ice, a sentence; "" where it is not, or where nothing tells."""
+    few = [(p["value"], p["body_widths"], p["body_widths_needed"]) for c in found["conditions"] for p in c["points"]
+           if (p.get("body_widths_needed") or 0) > (p.get("body_widths") or np.inf)]
+    if not few:
+        return ""
+    values = sorted({v for v, _, _ in few})
+    at = value(found, values[0]) + (f" to {value(found, values[-1])}" if len(values) > 1 else "")
+    return (f"WARNING: at {at} the domain is narrow for its ice ({min(w for _, w, _ in few):.3g} body widths; up to "
+            f"{max(n for _, _, n in few):.3g} are asked for): walls or periodic images carry part of the resistance, "
+            "and tows stop too early there; make domain.width larger.")
+
+
 def text(found, markdown=False):
-    return "\n\n".join([limits(found, markdown), meaning(found), curve(found, markdown)])
+    return "\n\n".join(part for part in (limits(found, markdown), narrow(found), meaning(found),
+                                         curve(found, markdown)) if part)
 
 
 def _numbers(values):

@@ -8,8 +8,14 @@ Of a case a study is made: over concentrations, with as many fields of each as t
 condition are run, then as many as fit into what is left, by the time which these took; members go field by field, so
 conditions have equally many, and should the time run out all the same, the fields that are complete in every condition
 are taken. Members are independent: one process of one thread a core. The same call goes on where an earlier one ended.
+
+Where the domain of the case is too narrow for a concentration by the rule of `bergtow check`, that condition gets the
+width that the rule asks for: a load that rests on the periodic images of the body is none to design for. Walls are part
+of the question, and are left where they are.
 """
 import argparse
+import json
+import math
 import os
 import re
 import subprocess
@@ -40,6 +46,9 @@ RESERVE = 30.0, 10.0         # s of the budget for pages, and for the statistics
 MARGIN = 0.95                # of what is left is given to fields
 FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
 REPLAY_FRAMES = 120
+SECTIONS = "run", "domain", "ice", "tow", "output"
+#: where the case says one of these, the place of the ice is given, and the domain is not made wider
+PLACED = "domain.y0", "ice.y_min", "ice.y_max"
 FEW = 5                      # fields below which nothing is known of the scatter between them
 
 
@@ -100,6 +109,36 @@ def title_of(case, name, values):
     return ": ".join(part for part in (str(title or name), words) if part)
 
 
+def checked(work, a, concentration):
+    """What `bergtow check` says of the case at a concentration. Errors: RunError."""
+    sets = [part for text in [*a.set, f"ice.concentration={concentration!r}"] for part in ("--set", text)]
+    done = subprocess.run([str(work.program), "check", str(a.file), "--json", *sets], capture_output=True, text=True)
+    if done.returncode:
+        raise RunError(a.file, (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0],
+                       "mend the case")
+    return json.loads(done.stdout)
+
+
+def wide_enough(domain):
+    """The width, m, of three digits, that the ice in a domain needs; None where it is there, or cannot be had."""
+    widths, needed = domain["body_widths"], domain["body_widths_needed"]
+    if domain["sides"] != "periodic images" or not widths or not needed or needed <= widths:
+        return None
+    width = domain["width_m"] * needed / widths
+    digit = 10.0 ** (math.floor(math.log10(width)) - 2)
+    return round(math.ceil(width / digit) * digit, 6)
+
+
+def widths(work, a, case):
+    """{concentration: domain.width as text} for those that need a wider domain than the case has. Errors: RunError."""
+    replaced = {text.split("=")[0].strip() for text in a.set}
+    placed = [key for key in PLACED if says(case, *key.split(".")) is not None]
+    if a.keep_width or reads_ice(case) or placed or replaced & {"domain.width", *PLACED}:
+        return {}
+    found = {c: wide_enough(checked(work, a, c)["domain"]) for c in a.concentrations}
+    return {c: f"{width:g} m" for c, width in found.items() if width}
+
+
 def write_study(a, case, repeats):
     """The study of a case: DIR/design.yml. Errors: RunError."""
     values = [] if reads_ice(case) else a.concentrations
@@ -109,6 +148,8 @@ def write_study(a, case, repeats):
     }
     if values:
         study["parameters"] = {"ice.concentration": values}
+    if a.widths:
+        study["with"] = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in a.widths.items()}
     if says(case, "output", "panels") is None and says(case, "tow", "mode") != "none":
         study["set"] = {"output.panels": True}
     path = a.output / "design.yml"
@@ -144,6 +185,10 @@ def seconds_of_the_longest(e):
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
     n = min(FIRST, a.fields)
+    a.widths = widths(work, a, case)
+    for c, width in a.widths.items():
+        print(f"at {100 * c:g} % the domain is made {width} wide: narrower, its periodic images would carry part "
+              "of the load (--keep-width: leave it as it is)")
     whole_round = work.ensemble(write_study(a, case, n))
     if not whole_round and fields_done(Ensemble(a.output)) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
@@ -227,6 +272,8 @@ def arguments(argv):
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
     p.add_argument("--concentrations", type=concentrations, metavar="A,...", default=concentrations(CONCENTRATIONS),
                    help=f"of a case (default: {CONCENTRATIONS})")
+    p.add_argument("--keep-width", action="store_true", help="of a case: leave its domain.width as it is, although "
+                   "dense ice needs a wider one")
     p.add_argument("--fields", type=whole, default=MOST_FIELDS, metavar="N",
                    help="of a case: at most so many of each condition (default: %(default)s)")
     p.add_argument("--seed", type=whole, default=1, metavar="N", help="of a case: of its fields (default: 1)")
@@ -270,7 +317,7 @@ def main(argv=None):
         work.ensemble(a.file)
     else:
         layers = files(a.file)
-        run_case(work, a, {name: section(layers, name) for name in ("run", "ice", "tow", "output")})
+        run_case(work, a, {name: section(layers, name) for name in SECTIONS})
     if not a.no_replay:
         make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
     report.write_all(a.output, [a.output / name for name in made], a)

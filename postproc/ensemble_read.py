@@ -12,6 +12,7 @@ a sound seal, and a member whose files do not fit the record of its end (soundne
 number until `bergtow ensemble` has run it again. Errors: RunError.
 """
 import json
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -182,6 +183,15 @@ class Ensemble:
     def sampled(self):
         """True for a Latin hypercube, False for a grid."""
         return "sampling: latin-hypercube" in self.study.split("# base case")[0]
+
+    @cached_property
+    def tied(self):
+        """{key: [(of the condition, value as written)]} of the keys that go with one value of a parameter."""
+        out = {}
+        for where, texts in re.findall(r"^with (.+?): (.+)$", self.study.split("# base case")[0], re.M):
+            for key, value in re.findall(r"([a-z_.]+)=(.*?)(?=, [a-z_.]+=|$)", texts):
+                out.setdefault(key, []).append((where, value))
+        return out
 
     # ---- members
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The design statement and the statistics of loads as tables of text or Markdown."""
+from itertools import zip_longest
+
 import numpy as np
 
 import text_table
@@ -63,9 +65,23 @@ def design(s, markdown):
         f"{asked(s)}. 95 %: interval over fields, without what the warnings name. * beyond the hours "
         f"simulated: extrapolated by the tail."
     ]
-    held = sorted({c["design"]["holds_for"] for c in s["conditions"] if c["design"]["holds_for"]})
-    notes += [f"Holds for: {'; or '.join(held)}."] if held else []
+    notes += [holds_for(s)] if holds_for(s) else []
     return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+
+
+def holds_for(s):
+    """"Holds for: ...", what is the same for all conditions once, and of what is not, the conditions; "" of none."""
+    found = {c["label"]: c["design"]["holds_for"].split(", ") for c in s["conditions"] if c["design"]["holds_for"]}
+    if not found:
+        return ""
+    parts = []
+    for texts in zip_longest(*found.values(), fillvalue=""):
+        where = {}
+        for label, text in zip(found, texts):
+            where.setdefault(text, []).append(label)
+        where.pop("", None)
+        parts += where if len(where) == 1 else [f"{text} ({several(labels)})" for text, labels in where.items()]
+    return f"Holds for: {', '.join(parts)}."
 
 
 def warnings(s):

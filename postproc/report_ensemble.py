@@ -140,7 +140,7 @@ def answer(e, s, case, results):
                      "number.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
-    asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
+    asked, held = loads_text.asked(s), loads_text.holds_for(s)
     figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
         s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
         lambda key: reading(key, e.units[key])[0]))
@@ -152,7 +152,7 @@ def answer(e, s, case, results):
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
              "rows": report_method.holds(case, s) + report_method.beyond(results)}] if case else []
-    return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
+    return out + [lines(held)] * bool(held)
 
 
 def governing(s):
@@ -342,6 +342,9 @@ def varied(e, values):
             factor, unit = reading(key, e.units[key])
             words[key] = "varied" if some.dtype == object else \
                 f"varied, {factor * np.nanmin(some):.4g} to {factor * np.nanmax(some):.4g} {unit}".strip()
+    for v in values:
+        if v.key in e.tied:
+            words[v.key] = "; ".join(dict.fromkeys([v.value, *(f"{value} at {c}" for c, value in e.tied[v.key])]))
     return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
 
 
@@ -383,7 +386,7 @@ def context(folder, place=None, given=None, also=()):
         "answer": answer(e, s, case, results),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
-        "method": report_method.method(s, case), "limits": report_method.limits(s, case),
+        "method": report_method.method(s, case), "limits": report_method.limits(case, statement.unbounded(e, e.used)),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
         "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,

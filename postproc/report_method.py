@@ -7,7 +7,6 @@ import capability_text
 import loads_text
 import stat_extreme
 import stat_profile
-from statement import RIGID
 from text_table import number, quantity
 
 
@@ -65,17 +64,16 @@ def method(s, case):
     return out
 
 
-def limits(s, case):
-    """Sentences on what the model leaves out, the gravest first."""
+def limits(case, jams):
+    """Sentences on what the model leaves out, the gravest first. jams: are there rigid floes so dense that they jam?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if case is None:
         return out
-    texts, dense = case.texts, any(c["values"].get("ice.concentration", 0) >= RIGID for c in s["conditions"]
-                                   if not isinstance(c["values"].get("ice.concentration", 0), str))
+    texts = case.texts
     if case.rigid:
         out.append("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
-                   + (f", and from {100 * RIGID:.0f} % of ice on floes jam." if dense else "."))
+                   + (", and here they are dense enough to jam." if jams else "."))
     else:
         rafts = texts.get("ice.rafting.kappa", "0") != "0"
         crushes = not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ")

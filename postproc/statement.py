@@ -7,7 +7,6 @@ Warnings are facts about the model or the sample that an interval does not hold:
 domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a start-up, which no number
 holds, that takes more than the value.
 """
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,6 @@ import stat_profile
 from bergtow_read import Run, RunError
 from text_table import quantity, short
 
-RIGID = 0.75        # concentration from which on rigid floes jam and nothing limits the force
 FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
 WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
 SHORT_FIELDS = stat_profile.LEAST_FIELDS
@@ -80,26 +78,40 @@ def speed_made_good(e, rows):
             } if len(speeds) else None
 
 
+def _numbers(e, name, rows):
+    return e.summary.get(name, np.full(e.n, np.nan))[rows]
+
+
+def unbounded(e, rows):
+    """Is there a member whose rigid floes jam? Of an earlier program, which had no number for it, its warning says."""
+    known = _numbers(e, "domain_load_unbounded", rows)
+    return bool(np.any(known == 1)) or any(
+        text.startswith("ice.concentration:") for m in rows[np.isnan(known)] for text in e.texts(m))
+
+
+def domain(e, rows):
+    """How much too narrow the domain is, "" where it is not; of an earlier program, how many members say so."""
+    widths, needed = (_numbers(e, f"domain_body_widths{name}", rows) for name in ("", "_needed"))
+    if np.any(few := widths < needed):
+        return f"{widths[few].min():.3g} body widths; {needed[few].max():.3g} are asked for"
+    some = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows[np.isnan(widths)])
+    return f"{some} of {len(rows)} members" if some else ""
+
+
 def _of_the_case(e, rows, case, tow):
     """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
     out = []
-    concentration = e.summary.get("concentration", np.full(e.n, np.nan))[rows]
-    dense = np.nanmax(concentration, initial=0.0)
     if case is None:
         out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
-    elif case.rigid and dense >= RIGID:
-        out.append((f"rigid floes at {100 * RIGID:.0f} % and more: nothing in the model limits the force of a jam, so "
+    elif unbounded(e, rows):
+        out.append(("rigid floes so dense that they jam: nothing in the model limits the force of a jam, so "
                     "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
-                    f"{100 * dense:.0f} %"))
+                    f"{100 * np.nanmax(e.summary['concentration'][rows]):.0f} %"))
     if case is not None and case.mode == "speed":
         out.append(("the speed is prescribed: neither vessel nor line yields", ""))
-    narrow = [text for m in rows for text in e.texts(m) if text.startswith("domain.width:")]
-    if narrow:
-        widths = re.findall(r"([\d.]+) body widths", narrow[0])
-        how = f"{widths[0]} body widths; {widths[1]} are asked for" if len(widths) == 2 else \
-            f"{len(narrow)} of {len(rows)} members"
+    if narrow := domain(e, rows):
         out.append(("the domain is narrow for this ice, and floes can arch to walls or to the periodic image: the "
-                    "value can be too large", how))
+                    "value can be too large", narrow))
     left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
     if np.nanmax(left, initial=0.0) > 0:
         out.append(("floes left through the open ends of the domain and resist no more: the value can be too small",

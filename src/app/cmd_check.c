@@ -27,6 +27,7 @@ static const double gravity = 9.81;
 typedef struct {
     bt_cmd_case file;
     double scale; ///< length ratio of the twin to print, 0 = none
+    bool json;
 } options;
 
 // A number, or a fraction as in 1/30.
@@ -51,10 +52,15 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
     case 'l': o->scale = parse_scale(state, arg); return 0;
+    case 'j': o->json = true; return 0;
+    case ARGP_KEY_END:
+        if (o->json && o->scale > 0) argp_error(state, "--json and --scale: the twin is a case file; give one of them");
+        return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 static const struct argp_option check_options[] = {
+    {"json", 'j', NULL, 0, "print the numbers of a case as JSON", 0},
     {"scale", 'l', "L", 0, "print the Froude-scaled twin with all lengths times L as a case file instead", 0},
     {0},
 };
@@ -305,7 +311,31 @@ static void print_packing(const bt_case *c, const bt_check_ice *n)
                p.packed, p.time, p.way);
 }
 
-static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
+static void print_text(const char *path, const bt_case *c, const bt_field *f, const bt_comm *comm,
+                       const bt_check_ice *n, const bt_check_ice *run, const bt_lead_stats *lead,
+                       const bt_errors *warnings)
+{
+    char text[64];
+    printf("%s: valid%s\n", path, warned(warnings->n, text));
+    if (c->run.title) printf("title                %s\n", c->run.title);
+    printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
+    print_ice(c, n);
+    print_crushing(c, n);
+    print_rafting(c, n);
+    print_outlines(&f->outlines, c);
+    print_body(c);
+    print_width(c, n);
+    print_packing(c, n);
+    print_window(c);
+    print_environment(c);
+    print_drift(c, run);
+    print_lead(c, lead);
+    print_step(c, n);
+    print_cost(c, comm, run);
+    print_warnings(path, warnings);
+}
+
+static bt_status print_numbers(const options *o, const bt_case *c, bt_field *f, bt_errors *err)
 {
     const bt_comm *comm = bt_comm_world();
     bt_check_ice n, run;
@@ -313,25 +343,9 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     const bt_status status = bt_check_ready(c, comm, f, &n, &run, &lead, err);
     if (status != BT_OK) return status;
     bt_errors warnings = {0};
-    char text[64];
     bt_check_warn(c, &n, &warnings);
-    printf("%s: valid%s\n", path, warned(warnings.n, text));
-    if (c->run.title) printf("title                %s\n", c->run.title);
-    printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
-    print_ice(c, &n);
-    print_crushing(c, &n);
-    print_rafting(c, &n);
-    print_outlines(&f->outlines, c);
-    print_body(c);
-    print_width(c, &n);
-    print_packing(c, &n);
-    print_window(c);
-    print_environment(c);
-    print_drift(c, &run);
-    print_lead(c, &lead);
-    print_step(c, &n);
-    print_cost(c, comm, &run);
-    print_warnings(path, &warnings);
+    if (o->json) bt_check_print_json(o->file.path, c, comm, &n, &run, &warnings);
+    else print_text(o->file.path, c, f, comm, &n, &run, &lead, &warnings);
     bt_errors_free(&warnings);
     return BT_OK;
 }
@@ -348,9 +362,13 @@ static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
 
 static bt_status check_study(const options *o, bt_errors *err)
 {
-    if (!(o->scale > 0)) return bt_check_study(&o->file, bt_comm_world()->size, err);
-    bt_errors_add(err, "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
-                  o->file.path);
+    if (!(o->scale > 0) && !o->json) return bt_check_study(&o->file, bt_comm_world()->size, err);
+    if (o->json)
+        bt_errors_add(err, "%s: is a study, and --json is for a case; check its base case, with --set for what varies",
+                      o->file.path);
+    else
+        bt_errors_add(err, "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
+                      o->file.path);
     return BT_ERR_USAGE;
 }
 
@@ -369,7 +387,7 @@ int bt_cmd_check(int argc, char **argv)
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
-    else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
+    else if (status == BT_OK) status = print_numbers(&o, &c, &f, &err);
     bt_field_free(&f);
     bt_case_free(&c);
     free(o.file.set);

@@ -14,6 +14,9 @@ static const struct { double concentration, widths; } needed[] = {{0.45, 10}, {0
 /// δ of arch.h, from this concentration on.
 static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, {0.95, 0.003}};
 
+/// Ice as made misses the concentration asked for in the last digits, and what is printed as 90 % has the rule of 90 %.
+static bool reaches(double concentration, double limit) { return concentration >= limit - 0.005; }
+
 bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
 {
     double v[2 * BT_MAX_VERTICES];
@@ -27,14 +30,15 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
                  .floes = floe_size > 0 ? c->domain.width / floe_size : NAN};
     a.sides = open ? "open sides" : c->domain.sides == BT_BOUND_PERIODIC ? "periodic images" : "walls";
     for (size_t k = 0; k < sizeof needed / sizeof *needed; k++)
-        if (concentration >= needed[k].concentration) a.widths = needed[k].widths;
+        if (reaches(concentration, needed[k].concentration)) a.widths = needed[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
     for (size_t k = 0; k < sizeof locked / sizeof *locked; k++)
-        if (concentration >= locked[k].concentration && way > 0)
+        if (reaches(concentration, locked[k].concentration) && way > 0)
             a.widths = bt_max(a.widths, ceil(2 * sqrt(way / (BT_PI * locked[k].slack * across))));
-    a.possible = !open && n > 0 && floe_size > 0 && a.bodies < a.widths;
+    a.held = !open && n > 0 && floe_size > 0;
+    a.possible = a.held && a.bodies < a.widths;
     a.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
-    a.unbounded = a.rigid && n > 0 && floe_size > 0 && concentration >= BT_BOUND_CONCENTRATION;
+    a.unbounded = a.rigid && n > 0 && floe_size > 0 && reaches(concentration, BT_BOUND_CONCENTRATION);
     return a;
 }
 

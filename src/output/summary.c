@@ -126,8 +126,8 @@ static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals 
     if (s->window.verdict != BT_STEADY)
         bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
     bt_case_warn_start(c, &s->warnings);
-    const bt_arch arch = bt_arch_of(c, t->concentration, t->mean_size);
-    bt_arch_warn(&arch, &s->warnings);
+    s->arch = bt_arch_of(c, t->concentration, t->mean_size);
+    bt_arch_warn(&s->arch, &s->warnings);
     const bt_packing packing = bt_packing_of(c, t->concentration);
     bt_packing_warn(&packing, s->sim_time, &s->warnings); // where its window ends, too
 }

@@ -4,6 +4,7 @@
 #define BT_SUMMARY_H
 
 #include "bergtow/estimate.h"
+#include "case/arch.h"
 #include "output/record.h"
 #include "bergtow/stats.h"
 #include "output/steady.h"
@@ -14,6 +15,7 @@ typedef struct bt_summary {
     bool body;                        ///< there is a towed body: the forces have a meaning
     double sim_time;                  ///< s
     bt_steady window;
+    bt_arch arch;                     ///< width of the domain against ice and body, as made; nothing without a body
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
     /// reductions of the registered quantities over the window, without a towed body over all steps

@@ -134,6 +134,10 @@ def test_the_limit_of_concentration_against_brute_force(tmp_path):
             assert np.mean(speeds >= 0.1) <= 3 / 6
     assert one["runs"] < 0.6 * found["grid_runs"] and f"{one['runs']} runs in" in text
     speeds = [p["mean_speed"] for p in one["points"]]
+    assert all(p["body_widths"] == pytest.approx(6, rel=0.01) for p in one["points"])
+    assert all(p["body_widths_needed"] == (30 if p["value"] >= 0.7 else 10 if p["value"] >= 0.45 else None)
+               for p in one["points"] if abs(p["value"] - 0.85) > 0.05 and p["value"] < 0.85)
+    assert "WARNING: at" in text
     assert 0.12 < speeds[0] < 0.16 and speeds[-1] < 0.09 and len(one["points"]) >= 3
     assert (tmp_path / "out/capability.png").stat().st_size > 20_000
     # the same call makes no run again
@@ -246,6 +250,11 @@ def test_its_block_for_a_report(tmp_path):
     block = findings.chapter("capability", findings.read("capability", tmp_path))
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
+    assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
+    hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
+    (tmp_path / "capability.json").write_text(json.dumps(found))
+    said = findings.chapter("capability", findings.read("capability", tmp_path))["markdown"]
+    assert "at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:

@@ -77,6 +77,43 @@ def test_the_study_that_it_makes(made):
     assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
 
 
+@pytest.mark.parametrize("domain, width", [
+    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 77}, 6170),
+    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 31}, None),
+    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": None}, None),
+    ({"sides": "walls", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 77}, None),
+    ({"sides": "periodic images", "width_m": 10, "body_widths": 4.996, "body_widths_needed": 30}, 60.1)
+])
+def test_the_width_that_the_ice_needs(domain, width):
+    assert design.wide_enough(domain) == width
+
+
+PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration=10, output__window_start=2)
+
+
+@pytest.mark.parametrize("case, more, wider", [
+    (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}), (PERIODIC, ("--keep-width",), None),
+    (PERIODIC, ("--set", "domain.width=6 m"), None), (changed(PERIODIC, domain__y0=-2.5), (), None),
+    (PERIODIC, ("--set", "domain.sides=wall"), None)
+])
+def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, case, more, wider):
+    write_case(tmp_path, case)
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    out = tmp_path / "out"
+    design.main([str(tmp_path / "case.yml"), "-o", str(out), "--concentrations", "0.2,0.45", "--fields", "1", "--quiet",
+                 "--no-pdf", "--no-replay", *more])
+    assert yaml.safe_load((out / "design.yml").read_text()).get("with") == wider
+    narrow = 3 if "domain.width=6 m" in more else 2.5
+    widths = list(Ensemble(out).summary["domain_body_widths"])
+    assert widths == pytest.approx([narrow, 10 if wider else narrow], rel=0.01)
+    assert ("at 45 % the domain is made 20.1 m wide" in capsys.readouterr().out) == bool(wider)
+    page = (out / "report.html").read_text()
+    assert ("domain is narrow for this ice" in page) == (not wider)
+    if wider:  # what it holds for is said of each condition, and the keys show both
+        assert "domain 5 m wide (concentration 20 %), domain 20.1 m wide (concentration 45 %), time step" in page
+        assert "5 m; 20.1 m at ice.concentration=0.45" in page
+
+
 def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
     before = {p.name: p.stat().st_mtime_ns for p in made.iterdir()}
     a = design.arguments([str(made.parent / "case.yml"), "-o", str(made)])

@@ -22,6 +22,7 @@ import loads_text  # noqa: E402
 import plot_ensemble  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
+import statement as statement_module  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 TRIALS = 14
@@ -148,20 +149,24 @@ CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load
         "  crushing:\n    pressure: {pressure} Pa\n")
 
 
-def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None, jerk=1e9):
+def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None, jerk=1e9, earlier=False):
     """Ensemble of AR(1) tow forces of mean 1 MN and 3 MN with a start-up jerk before the window, in 1 s samples."""
     rng, members = np.random.default_rng(4), []
     for c, a in enumerate(concentrations):
         for _ in range(fields):
             x = made_up.ar1(0.8, N, rng, 1e6 * (1 + 2 * c), 2e5)
             x[:30] = jerk
-            warned = ["domain.width: 15 body widths"] if a > 0.8 else []
+            dense = a > 0.8
+            # of an earlier program the warning alone says it
+            warned = ["domain.width: 15 body widths", "ice.concentration: 90 %"] if dense and earlier else []
+            domain = {} if earlier else {"domain_body_widths": 15, "domain_load_unbounded": dense and pressure == 0,
+                                         "domain_body_widths_needed": 60 if dense else np.nan}
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
                       "line_tension_2": (0.98 + 0.05 * c) * x,
                       "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
                       "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
             members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, warnings=warned,
-                                          more=series, attributes=SERIES, summary={"concentration": a},
+                                          more=series, attributes=SERIES, summary={"concentration": a, **domain},
                                           case=text or CASE.format(pressure=pressure, load=load)))
     return made_up.write(folder, members)
 
@@ -213,11 +218,19 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     warnings = {w["what"] for w in second["warnings"]}
     assert any("no upper bound" in w for w in warnings) and any("domain is narrow" in w for w in warnings)
     assert not any("no upper bound" in w["what"] or "narrow" in w["what"] for w in first["warnings"])
+    assert ["15 body widths; 60 are asked for"] == [w["detail"] for w in second["warnings"] if "narrow" in w["what"]]
     assert any("extrapolated to more than 10 times" in w["what"] for w in first["warnings"])
-    assert "WARNING: Rigid floes at 75 % and more" in text and "concentration 90 % (90 %)" in text
+    assert "WARNING: Rigid floes so dense that they jam" in text and "concentration 90 % (90 %)" in text
     rows = list(csv.DictReader(open(folder / "statistics.csv")))
     assert float(rows[1]["tow_force_design_n"]) == second["tow"]["value"] and float(
         rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
+
+
+def test_members_of_an_earlier_program_say_it_in_their_warnings(tmp_path):
+    e = Ensemble(towed(tmp_path / "a", fields=2, earlier=True))
+    for k, c in enumerate(e.conditions()):
+        assert ["", "2 of 2 members"][k] == statement_module.domain(e, c.finished)
+        assert statement_module.unbounded(e, c.finished) == (k == 1)
 
 
 def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_path):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The window of a run as a user meets it: a start that jerks the line, one that does not, and what the verdict says of
 each."""
+import json
 import math
 import re
 
 import pytest
-from harness import CASE, DONE, ROOT, TOW, call, changed, run, write_case
+from harness import CASE, DONE, ROOT, TOW, USAGE, call, changed, run, write_case
 
 # A disc of 80 m on a line of 400 m, almost in open water: 3 million kg per metre of draft and a period of a minute and
 # a half.
@@ -115,6 +116,30 @@ def test_the_width_of_the_domain_is_reported(tmp_path):
     wide = call("check", write_case(tmp_path, changed(narrow, domain__width=5000)))
     assert "arches of rigid floes not expected" in wide.stdout and "can carry arches" not in wide.stdout
     assert call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": -1}))).returncode == CASE
+
+
+def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
+    below = 0
+    for c, widths in ((0.3, None), (0.45, 10), (0.7, 30), (0.75, 30), (0.85, 60)):
+        path = write_case(tmp_path, changed(BERG, ice__concentration=c, run__duration=5, tow__ramp=0,
+                                            tow__mode="speed", output__window_start=1, ice__seed=int(100 * c)))
+        done = call("check", path, "--json")
+        assert done.returncode == DONE, done.stderr
+        found = json.loads(done.stdout)
+        assert found["domain"] == {"length_m": 1500, "width_m": 400, "sides": "periodic images",
+                                   "body_widths": pytest.approx(5, rel=1e-3), "body_widths_needed": widths,
+                                   "load_unbounded": c >= 0.75}
+        assert len(found["warnings"]) == (widths is not None) + (c >= 0.75) and found["ice"]["concentration"] == c
+        assert found["run"]["n_steps"] == 5 and found["run"]["tow_distance_m"] == 2.5
+        assert found["cost"]["core_time_s"] > 0 and found["cost"]["memory_b"] > 1e6
+        assert call("run", path, "-o", "out", "--force", cwd=tmp_path).returncode == DONE
+        s = json.loads((tmp_path / "out/summary.json").read_text())
+        assert s["domain"] == {k: found["domain"][k] for k in ("body_widths", "body_widths_needed", "load_unbounded")}
+        assert s["n_floes"] == pytest.approx(found["ice"]["floes"], rel=0.1)
+        below += widths is not None and s["concentration"] < c
+    assert below  # ice as made misses what was asked for in the last digit, and has its rule all the same
+    wrong = call("check", path, "--json", "--scale", 2)
+    assert wrong.returncode == USAGE and "give one of them" in wrong.stderr
 
 
 def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
