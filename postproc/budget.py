@@ -23,12 +23,13 @@ import stat_load
 from bergtow_read import RunError
 from case_runs import STOPPED, program
 from ensemble_read import Ensemble
+from loads_text import hours_text
 
 import h5py
 import numpy as np
 
 BUDGET = 15.0  # min
-OF = "mean_ice_resistance_n", "tow_force:99"
+OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
 
 
 def run(binary, study, folder, sets, jobs, minutes):
@@ -66,7 +67,7 @@ def assumed(e):
 
 def quantile(e, rows, name, share):
     """({"units", "description"}, values [rows]) of a quantile of a load in the window, as the moving mean over the time
-    scale of loads.py; NaN where a member has no window that is long enough."""
+    scale of loads.py, the largest value at 100 %; NaN where a member has no window that is long enough."""
     scale, out, known = loads.TIME_SCALE / loads.scaling(e, rows), np.full(len(rows), np.nan), None
     for k, m in enumerate(rows):
         start, end = e.number("window_start_s", m), e.number("window_end_s", m)
@@ -76,16 +77,20 @@ def quantile(e, rows, name, share):
                 [start, end]).all() else None
             if field is not None:
                 known, out[k] = load, np.percentile(field["peak"], share)
-    return known and {"units": known.units, "description": f"{known.label} that {100 - share:g} % of the time exceeds, "
-                      f"as the moving mean over {scale:.3g} s"}, out
+    if known is None:
+        return None, out
+    hours = np.nanmedian([e.number("window_end_s", m) - e.number("window_start_s", m) for m in rows]) / 3600
+    words = f"largest {known.label} of a tow, within {hours_text(hours)}" if share == 100 else \
+        f"{known.label} that {100 - share:g} % of the time exceeds"
+    return {"units": known.units, "description": f"{words}, as the moving mean over {scale:.3g} s"}, out
 
 
 def numbers(e, of):
     """(its units and description, rows, values) of a number of the summary, or of LOAD:SHARE. Errors: RunError."""
     if load := re.fullmatch(r"(\w+):(\d+(?:\.\d+)?)", of):
         share = float(load[2])
-        if not 0 < share < 100:
-            raise RunError(of, "a quantile lies above 0 and below 100 %", "write it as tow_force:99")
+        if not 0 < share <= 100:
+            raise RunError(of, "a quantile lies above 0 and at most at 100 %", "write it as tow_force:99")
         meaning, values = quantile(e, e.used, load[1], share)
         if meaning is None:
             raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
@@ -147,8 +152,8 @@ def main(argv=None):
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
     p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
-                   "quantile of a load in %%, as the moving mean over its time scale; may be repeated (default: "
-                   f"{', '.join(OF)})")
+                   "quantile of a load in %%, 100 for the largest value of a tow, as the moving mean over its time "
+                   f"scale; may be repeated (default: {', '.join(OF)})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
                    "computation adds")
     findings.add_options(p, BUDGET)

@@ -174,18 +174,24 @@ def test_a_study_end_to_end(small):
     assert found["mean"] == pytest.approx(y.mean())
     assert found["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(pairs, axis=1, ddof=1)))
     assert (folder / "out/budget.png").stat().st_size > 15_000
-    tail = found["more"][0]
-    assert tail["of"] == "tow_force:99"
+    tail, largest = found["more"]
+    assert [tail["of"], largest["of"]] == ["tow_force:99", "tow_force:100"]
     assert "tow force that 1 % of the time exceeds, as the moving mean over 1 s" in text
-    levels = []
+    levels, most = [], []
     for member in sorted((folder / "out/members").iterdir()):
         with h5py.File(member / "result.h5") as f:
             t, x = f["series/time"][:], f["series/tow_force"][:]
         n = round(1 / (t[1] - t[0]))
         some = x[t >= json.loads((member / "summary.json").read_text())["window"]["start_s"] - 1e-9]
-        levels.append(np.percentile(np.convolve(some, np.full(n, 1 / n), "valid"), 99))
+        means = np.convolve(some, np.full(n, 1 / n), "valid")
+        levels.append(np.percentile(means, 99))
+        most.append(means.max())
     assert len(levels) == 24 and tail["mean"] == pytest.approx(np.mean(levels), rel=1e-9)
     assert tail["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(np.reshape(levels, (12, 2)), axis=1, ddof=1)))
+    assert largest["mean"] == pytest.approx(np.mean(most), rel=1e-9) and largest["mean"] > tail["mean"]
+    seconds = json.loads((member / "summary.json").read_text())["window"]
+    minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
+    assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
     block = findings.chapter("budget", findings.read("budget", folder / "out"))
     assert block["markdown"].startswith("| part |") and len(block["figure"]().axes) == 2
     (folder / "converge.json").write_text(json.dumps({"rows": [{"name": "dt", "interval_95": [-0.1, 0.2]}]}))
@@ -216,7 +222,8 @@ def test_what_is_refused(small, tmp_path):
     assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
     assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out")
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
-    assert "above 0 and below 100 %" in said(STUDY, "--of", "tow_force:100", out=folder / "out")
+    for wrong in ("tow_force:101", "tow_force:0"):
+        assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out")
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))
