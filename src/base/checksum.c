@@ -19,16 +19,9 @@ static const unsigned char hdf5_magic[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1
 
 static bool read_at(int fd, void *to, size_t bytes, off_t at)
 {
-    char *p = to;
-    while (bytes > 0) {
-        const ssize_t n = TEMP_FAILURE_RETRY(pread(fd, p, bytes, at));
-        if (n <= 0) {
-            if (n == 0) errno = EIO; // it has become shorter meanwhile
-            return false;
-        }
-        p += n, at += n, bytes -= (size_t)n;
-    }
-    return true;
+    const ssize_t n = bt_file_get(fd, at, to, bytes);
+    if (n >= 0 && (size_t)n < bytes) errno = EIO; // it has become shorter meanwhile
+    return n == (ssize_t)bytes;
 }
 
 static void print_digest(XXH128_hash_t h, char out[BT_CHECKSUM_DIGEST])
@@ -72,7 +65,7 @@ bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST]
 {
     struct stat st;
     // a pipe must not keep us waiting
-    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    const int fd = bt_file_descriptor(path, O_RDONLY | O_NONBLOCK);
     int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : 0;
     const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
     if (!reason && !odd && !digest(fd, 0, st.st_size, out)) reason = errno;
@@ -89,7 +82,7 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
 {
     char block[BT_CHECKSUM_BYTES];
     struct stat st;
-    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDWR | O_CLOEXEC));
+    const int fd = bt_file_descriptor(path, O_RDWR);
     int reason = fd < 0 || fstat(fd, &st) != 0 || !make(fd, st.st_size, kind, block) ? errno : 0;
     if (!reason) {
         reason = bt_file_put(fd, 0, block, sizeof block);
@@ -175,9 +168,9 @@ bool bt_checksum_there(const char *path, const char *kind)
     char block[BT_CHECKSUM_BYTES + sizeof hdf5_magic] = "", front[80];
     snprintf(front, sizeof front, MAGIC "kind: %.*s", kind ? (int)strcspn(kind, " ") : 0, kind ? kind : "");
     struct stat st;
-    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    const int fd = bt_file_descriptor(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
     const bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
-    const ssize_t n = regular ? TEMP_FAILURE_RETRY(pread(fd, block, sizeof block, 0)) : -1;
+    const ssize_t n = regular ? bt_file_get(fd, 0, block, sizeof block) : -1;
     if (fd >= 0) close(fd);
     if (n < 0) return false;
     if (!strncmp(block, front, strlen(front))) return true;

@@ -48,17 +48,50 @@ char *bt_file_folder(const char *path)
     return slash ? bt_text_of("%.*s", (int)(slash > path ? slash - path : 1), path) : bt_text_copy(".");
 }
 
+int bt_file_descriptor(const char *path, int flags)
+{
+    int fd;
+    while ((fd = open(path, flags | O_CLOEXEC, 0666)) < 0 && errno == EINTR) {}
+    return fd;
+}
+
+ssize_t bt_file_get(int fd, off_t at, void *bytes, size_t n)
+{
+    size_t done = 0;
+    while (done < n) {
+        const ssize_t got = pread(fd, (char *)bytes + done, n - done, at + (off_t)done);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return -1;
+        if (got == 0) break;
+        done += (size_t)got;
+    }
+    return (ssize_t)done;
+}
+
 int bt_file_put(int fd, off_t at, const void *bytes, size_t n)
 {
     for (const char *p = bytes; n > 0;) {
-        const ssize_t done = TEMP_FAILURE_RETRY(pwrite(fd, p, n, at));
+        const ssize_t done = pwrite(fd, p, n, at);
+        if (done < 0 && errno == EINTR) continue;
         if (done <= 0) return done < 0 ? errno : ENOSPC;
         p += done, at += done, n -= (size_t)done;
     }
     return 0;
 }
 
-int bt_file_sync(int fd) { return TEMP_FAILURE_RETRY(fsync(fd)) != 0 ? errno : 0; }
+int bt_file_sync(int fd)
+{
+    int failed;
+    while ((failed = fsync(fd)) < 0 && errno == EINTR) {}
+    return failed ? errno : 0;
+}
+
+int bt_file_resize(int fd, off_t size)
+{
+    int failed;
+    while ((failed = ftruncate(fd, size)) < 0 && errno == EINTR) {}
+    return failed ? errno : 0;
+}
 
 int bt_file_close(int fd) { return close(fd) != 0 && errno != EINTR ? errno : 0; }
 
@@ -92,12 +125,12 @@ static int open_input(const char *path, const char *what, bool text, bool stream
     int fd = -1, reason = stat(path, &st) != 0 ? errno : 0;
     const bool seen = reason == 0;
     if (seen && !(kind = kind_of(st.st_mode))) {
-        fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
+        fd = bt_file_descriptor(path, O_RDONLY | O_NONBLOCK | O_NOCTTY);
         if (fd < 0 || fstat(fd, &st) != 0) reason = errno;
         else kind = kind_of(st.st_mode);
     } else if (seen && taken && !S_ISDIR(st.st_mode)) {
         kind = NULL;
-        fd = open(path, O_RDONLY | O_CLOEXEC);
+        fd = bt_file_descriptor(path, O_RDONLY);
         if (fd < 0) reason = errno;
     }
     if (!reason && !kind) return fd;
@@ -131,7 +164,9 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     size_t cap = 1 << 14, n = 0;
     *text = bt_alloc(cap, 1);
     ssize_t got = 0;
-    while (n <= most && (got = TEMP_FAILURE_RETRY(read(fd, *text + n, cap - n - 1))) > 0) {
+    while (n <= most && (got = read(fd, *text + n, cap - n - 1)) != 0) {
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) break;
         n += (size_t)got;
         if (n == cap - 1) *text = bt_realloc(*text, cap *= 2, 1);
     }
@@ -172,7 +207,7 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     // A link of the temporary name must not lead the text elsewhere; nor does one of the right name,
     // which the rename replaces.
     unlink(temporary);
-    const int fd = (int)TEMP_FAILURE_RETRY(open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    const int fd = bt_file_descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
     int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, n);
     // a full disk shows at the sync or at the close as often as at the write itself
     if (!reason) reason = bt_file_sync(fd);
@@ -189,7 +224,7 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 static int sync_folder_of(const char *path)
 {
     char *folder = bt_file_folder(path);
-    const int fd = (int)TEMP_FAILURE_RETRY(open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    const int fd = bt_file_descriptor(folder, O_RDONLY | O_DIRECTORY);
     free(folder);
     // a folder that may be written to but not read: the system will bring the name to the disk in its own time
     if (fd < 0) return 0;
@@ -237,7 +272,7 @@ static int copy_bytes(int from, int to)
     char *buffer = bt_alloc(PIECE, 1);
     int reason = 0;
     off_t at = 0;
-    for (ssize_t n; !reason && (n = TEMP_FAILURE_RETRY(read(from, buffer, PIECE))) != 0;) {
+    for (ssize_t n; !reason && (n = bt_file_get(from, at, buffer, PIECE)) != 0;) {
         if (n < 0) {
             reason = errno;
             break;
@@ -251,10 +286,10 @@ static int copy_bytes(int from, int to)
 
 bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
 {
-    const int in = (int)TEMP_FAILURE_RETRY(open(from, O_RDONLY | O_CLOEXEC));
+    const int in = bt_file_descriptor(from, O_RDONLY);
     if (in < 0) return bt_file_fail(from, "read the file", errno, err);
     unlink(to); // a link of that name must not lead the copy elsewhere
-    const int out = (int)TEMP_FAILURE_RETRY(open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    const int out = bt_file_descriptor(to, O_WRONLY | O_CREAT | O_EXCL);
     int reason = out < 0 ? errno : copy_bytes(in, out);
     const int closed = out < 0 ? 0 : bt_file_close(out);
     if (!reason) reason = closed;
@@ -282,9 +317,9 @@ bool bt_file_begins(const char *path, const char *text)
     const size_t n = strlen(text);
     char *front = bt_alloc(n + 1, 1);
     struct stat st;
-    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    const int fd = bt_file_descriptor(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
     const bool same = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) &&
-                      TEMP_FAILURE_RETRY(pread(fd, front, n, 0)) == (ssize_t)n && !memcmp(front, text, n);
+                      bt_file_get(fd, 0, front, n) == (ssize_t)n && !memcmp(front, text, n);
     if (fd >= 0) close(fd);
     free(front);
     return same;

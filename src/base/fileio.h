@@ -30,11 +30,18 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
 /// Write text to path by way of a temporary name and bt_file_rename: path holds the old or the new text, never a part.
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err);
 
-// Calls of the system that a signal may interrupt (EINTR) or cut short; errno of a failure, or 0.
+// Calls of the system that a signal may interrupt (EINTR) or cut short: they are made again. TEMP_FAILURE_RETRY, which
+// does this anywhere, is glibc's alone.
+/// As open, with O_CLOEXEC and the mode 0666; −1 and errno.
+int bt_file_descriptor(const char *path, int flags);
+/// Read n bytes at a place of an open file. Returns how many there are before its end, or −1 and errno.
+ssize_t bt_file_get(int fd, off_t at, void *bytes, size_t n);
+// These return errno of a failure, or 0.
 /// Write n bytes at a place of an open file, all of them.
 int bt_file_put(int fd, off_t at, const void *bytes, size_t n);
-int bt_file_sync(int fd);  ///< bring what was written to the disk
-int bt_file_close(int fd); ///< Linux has closed it, too, where a signal interrupts the call
+int bt_file_sync(int fd);                ///< bring what was written to the disk
+int bt_file_resize(int fd, off_t size);
+int bt_file_close(int fd);               ///< Linux has closed it, too, where a signal interrupts the call
 
 /// Make a folder with its parents, and their names last; no error when it is there.
 bt_status bt_file_make_dir(const char *path, bt_errors *err);

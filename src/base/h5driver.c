@@ -64,8 +64,8 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
     const driver_info *info = H5Pget_driver_info(access);
     if (!info) return NULL;
     const int how = (flags & H5F_ACC_RDWR ? O_RDWR : O_RDONLY) | (flags & H5F_ACC_TRUNC ? O_TRUNC : 0) |
-                    (flags & H5F_ACC_CREAT ? O_CREAT : 0) | (flags & H5F_ACC_EXCL ? O_EXCL : 0) | O_CLOEXEC;
-    const int fd = (int)TEMP_FAILURE_RETRY(open(name, how, 0666));
+                    (flags & H5F_ACC_CREAT ? O_CREAT : 0) | (flags & H5F_ACC_EXCL ? O_EXCL : 0);
+    const int fd = bt_file_descriptor(name, how);
     struct stat st;
     if (fd < 0 || fstat(fd, &st) != 0) {
         *info->errnum = errno;
@@ -223,10 +223,8 @@ static void put_superblock(driver_file *f)
     if (k == f->n_pages || f->pages[k]->at > f->super) return;
     if (!bit_of(f->pages[k]->waits, (size_t)(f->super - f->pages[k]->at))) return;
     struct stat st;
-    if (!*f->errnum &&
-        (fstat(f->fd, &st) != 0 ||
-         ((haddr_t)st.st_size < f->eoa && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0)))
-        *f->errnum = errno;
+    if (!*f->errnum && fstat(f->fd, &st) != 0) *f->errnum = errno;
+    if (!*f->errnum && (haddr_t)st.st_size < f->eoa) *f->errnum = bt_file_resize(f->fd, (off_t)f->eoa);
     put_run(f, f->super, f->super_end);
     forget(f, f->super, f->super_end);
 }
@@ -350,19 +348,13 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t
 {
     (void)type, (void)transfer;
     driver_file *f = (driver_file *)file;
-    char *p = buffer;
-    size_t done = 0;
-    while (done < size) {
-        const ssize_t n = TEMP_FAILURE_RETRY(pread(f->fd, p + done, size - done, (off_t)(address + done)));
-        if (n < 0) {
-            if (!*f->errnum) *f->errnum = errno;
-            return -1;
-        }
-        if (n == 0) break; // beyond the end: zeros, as HDF5 defines it
-        done += (size_t)n;
+    const ssize_t n = bt_file_get(f->fd, (off_t)address, buffer, size);
+    if (n < 0) {
+        if (!*f->errnum) *f->errnum = errno;
+        return -1;
     }
-    memset(p + done, 0, size - done);
-    overlay(f, address, size, p);
+    memset((char *)buffer + n, 0, size - (size_t)n); // beyond the end: zeros, as HDF5 defines it
+    overlay(f, address, size, buffer);
     return 0;
 }
 
@@ -388,7 +380,7 @@ static herr_t driver_truncate(H5FD_t *file, hid_t transfer, hbool_t closing)
     driver_file *f = (driver_file *)file;
     if (f->eoa == f->eof) return 0;
     forget(f, f->eoa, MAX_ADDRESS);
-    if (!*f->errnum && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0) *f->errnum = errno;
+    if (!*f->errnum) *f->errnum = bt_file_resize(f->fd, (off_t)f->eoa);
     f->eof = f->eoa;
     return 0;
 }

@@ -92,7 +92,7 @@ bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_e
     if (c->size == 1) return h->status;
     bt_status status = bt_comm_agree(c, h->status);
     if (status == BT_OK) {
-        h->raw = (int)TEMP_FAILURE_RETRY(open(path, O_WRONLY | O_CLOEXEC));
+        h->raw = bt_file_descriptor(path, O_WRONLY);
         if (h->raw < 0) {
             *h->errnum = errno;
             fail(h, "open the file");

@@ -36,7 +36,7 @@ int bt_lock_take(const char *dir, bt_errors *err)
     char *path = bt_file_join(dir, "run.lock");
     int fd = -1;
     for (bool taken = false; !taken;) {
-        fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666));
+        fd = bt_file_descriptor(path, O_RDWR | O_CREAT | O_NOFOLLOW);
         if (fd < 0) {
             bt_file_fail(path, "make the file", errno, err);
             break;

@@ -17,7 +17,7 @@
 int bt_member_open(const char *folder, const char *name, int flags)
 {
     char *path = bt_file_join(folder, name);
-    const int fd = (int)TEMP_FAILURE_RETRY(open(path, flags | O_CLOEXEC, 0666));
+    const int fd = bt_file_descriptor(path, flags);
     free(path);
     return fd;
 }
@@ -25,7 +25,9 @@ int bt_member_open(const char *folder, const char *name, int flags)
 bool bt_member_take_lock(int fd, bool wait)
 {
     struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    return TEMP_FAILURE_RETRY(fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l)) == 0;
+    int failed;
+    while ((failed = fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l)) < 0 && errno == EINTR) {}
+    return !failed;
 }
 
 bool bt_member_held(const char *folder)

@@ -142,6 +142,32 @@ static void a_signal_at_a_sync_and_at_a_close(void **state)
     }
 }
 
+/// A signal while bytes go to the disk or come from it is no failure: the call is made again.
+static void a_signal_while_bytes_move(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/bergtow-signal-XXXXXX", back[8] = "";
+    const int write_reason = reason_of[WRITE], read_reason = reason_of[READ];
+    const int fd = mkstemp(path);
+    reason_of[WRITE] = reason_of[READ] = EINTR;
+    failing = WRITE, calls_before = 0;
+    assert_int_equal(bt_file_put(fd, 2, "berg", 4), 0);
+    assert_int_equal(failing, -1);
+    failing = READ, calls_before = 0;
+    assert_int_equal(bt_file_get(fd, 2, back, sizeof back), 4); // and no more where the file ends
+    assert_int_equal(failing, -1);
+    assert_string_equal(back, "berg");
+    reason_of[WRITE] = write_reason, reason_of[READ] = read_reason;
+    failing = READ, calls_before = 0;
+    assert_int_equal(bt_file_get(fd, 0, back, 1), -1);
+    assert_int_equal(errno, read_reason);
+    assert_int_equal(bt_file_resize(fd, 3), 0);
+    assert_int_equal(bt_file_get(fd, 0, back, sizeof back), 3);
+    close(fd);
+    unlink(path);
+    assert_int_equal(bt_file_resize(-1, 3), EBADF);
+}
+
 /// A text of which the system gives a part and then an error: here nothing at all, and the error at once.
 static void a_text_that_cannot_be_read(void **state)
 {
@@ -197,6 +223,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_failed_call_is_reported),
         cmocka_unit_test(a_signal_at_a_sync_and_at_a_close),
+        cmocka_unit_test(a_signal_while_bytes_move),
         cmocka_unit_test(a_text_that_cannot_be_read),
         cmocka_unit_test(a_file_with_fewer_bytes_than_its_size),
         cmocka_unit_test(what_was_cut_off_early_is_ours),
