@@ -18,16 +18,25 @@ def called(*words, cwd=None, **env):
 
 
 @pytest.fixture(scope="module")
-def usr(tmp_path_factory):
+def packed():
     if not shutil.which("dh"):
         pytest.skip("debhelper is missing: apt-get install dpkg-dev debhelper fakeroot")
     called("make", "deb", cwd=ROOT)
+
+
+@pytest.fixture(scope="module")
+def usr(packed, tmp_path_factory):
     root = tmp_path_factory.mktemp("root")
     packages = [p for p in (ROOT / "build/deb").glob("*.deb") if "dbgsym" not in p.name]
     assert {p.name.split("_")[0] for p in packages} == {"bergtow", "libbergtow0", "libbergtow-dev", "python3-bergtow"}
     for package in packages:
         called("dpkg", "-x", package, root)
     return root / "usr"
+
+
+@pytest.mark.skipif(not shutil.which("lintian"), reason="lintian is missing: apt-get install lintian")
+def test_lintian_has_no_error_and_no_warning(packed):
+    called("lintian", "--allow-root", "--fail-on", "error,warning", *(ROOT / "build/deb").glob("*.changes"))
 
 
 def test_the_program_its_cases_and_its_scripts(usr, tmp_path):
