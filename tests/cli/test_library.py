@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """libbergtow as a program outside of the tree meets it: installed, found by pkg-config, stepped, taken away again."""
+import json
 import os
 import pty
 import re
@@ -50,20 +51,26 @@ def flags(prefix, *what):
 
 
 @pytest.fixture(scope="module", params=["shared", "static"])
-def program(request, prefix, tmp_path_factory):
-    """The example, outside of the tree, with the library as pkg-config has it."""
+def built(request, prefix, tmp_path_factory):
+    """Examples, outside of the tree, with the library as pkg-config has it."""
     folder = tmp_path_factory.mktemp(request.param)
-    for name in ("simulation.c", "force_law.c"):
+    for name in ("simulation.c", "force_law.c", "measure.c", "quantity.c"):
         (folder / name).write_text((EXAMPLES / name).read_text())
     static = request.param == "static"
     libraries = flags(prefix, "--libs", *(["--static"] if static else []))
     if static:  # the linker takes a shared library where both are there
         libraries = [str(prefix / "lib/libbergtow.a") if word == "-lbergtow" else word for word in libraries]
-    subprocess.run(["gcc", "-std=c17", "-Wall", "-Wextra", "-Werror", "simulation.c", *flags(prefix, "--cflags"),
-                    *libraries, f"-Wl,-rpath,{prefix / 'lib'}", "-lm", "-o", "simulation"], cwd=folder, check=True)
-    needed = subprocess.run(["ldd", folder / "simulation"], capture_output=True, text=True, check=True).stdout
-    assert ("libbergtow.so.0" in needed) != static
-    return folder / "simulation"
+    for name in ("simulation", "measure"):
+        subprocess.run(["gcc", "-std=c17", "-Wall", "-Wextra", "-Werror", f"{name}.c", *flags(prefix, "--cflags"),
+                        *libraries, f"-Wl,-rpath,{prefix / 'lib'}", "-lm", "-o", name], cwd=folder, check=True)
+        needed = subprocess.run(["ldd", folder / name], capture_output=True, text=True, check=True).stdout
+        assert ("libbergtow.so.0" in needed) != static
+    return folder
+
+
+@pytest.fixture(scope="module")
+def program(built):
+    return built / "simulation"
 
 
 def stepped(program, case, *overrides):
@@ -86,15 +93,39 @@ def test_a_program_with_a_law_has_the_state_of_the_extended_one(program, tmp_pat
     assert stepped(program, case, "wave_drift.amplitude=0") != hash_of
 
 
+def test_a_program_with_quantities_has_them_on_the_way_and_in_its_result(built, tmp_path):
+    """As the extended program has them, beside the state of one without."""
+    case = write_case(tmp_path, CASE)
+    done = subprocess.run([built / "measure", case, tmp_path / "out"], capture_output=True, text=True, timeout=120,
+                          env=environment(OMP_NUM_THREADS=1))
+    assert done.returncode == 0, done.stderr
+    subprocess.run([EXTENDED, "run", case, "-o", tmp_path / "extended", "-q"], check=True, env=environment())
+    ours, theirs = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("out", "extended"))
+    plain = run(tmp_path, case, name="plain").hash
+    assert re.search(r"state_hash (\w+)", done.stdout)[1] == ours["state_hash"] == plain
+    names = {"moving_ice": "max_moving_ice_kg", "carried_water_force": "mean_carried_water_force_n"}
+    on_the_way = re.findall(r"(\d+) steps, carried water (\S+) N, moving ice (\S+) kg", done.stdout)
+    with h5py.File(tmp_path / "out/result.h5") as f, h5py.File(tmp_path / "extended/result.h5") as g:
+        for name, key in names.items():
+            series = f[f"series/{name}"]
+            assert np.array_equal(series, g[f"series/{name}"]) and np.abs(series).max() > 0
+            assert {"units", "description"} <= set(series.attrs) and ours[key] == theirs[key]
+        steps, carried, moving = np.array(on_the_way, float).T
+        assert len(steps) == len(f["series/time"]) // 10 > 5
+        assert np.array_equal(carried, f["series/carried_water_force"][9::10])
+        assert np.array_equal(moving, f["series/moving_ice"][9::10])
+
+
 def test_a_faulty_case_is_a_message_and_not_the_end(program, tmp_path):
     case = write_case(tmp_path, changed(CASE, tow__sped=1))
     result = subprocess.run([program, case], capture_output=True, text=True)
     assert result.returncode == 1 and "tow.sped: unknown key; did you mean tow.speed?" in result.stderr
 
 
-def test_the_page_shows_the_example():
-    page = (ROOT / "docs/library.md").read_text()
-    assert re.search(r"```c\n(.*?)```", page, re.DOTALL)[1] == (EXAMPLES / "simulation.c").read_text()
+@pytest.mark.parametrize("page, example", [("library", "simulation"), ("how-to-add-a-quantity", "measure")])
+def test_the_page_shows_the_example(page, example):
+    text = (ROOT / f"docs/{page}.md").read_text()
+    assert (EXAMPLES / f"{example}.c").read_text() in re.findall(r"```c\n(.*?)```", text, re.DOTALL)
 
 
 def test_the_library_exports_what_public_headers_name(prefix):
