@@ -41,7 +41,9 @@ class Simulation:
 
     out: a result folder as `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
     functions of Bodies by the name of their series (NAME_force). The block that is left by an exception writes no
-    summary. Arrays are copies, in the order of the ids: floes, the towed body, walls.
+    summary. Arrays are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the
+    simulation are sorted by cells and allocated anew within a step, so that a view would come to show other bodies, or
+    memory that has been given back; positions of 100,000 bodies take 0.3 ms to copy.
     """
 
     def __init__(self, case: Case | str | os.PathLike[str] | Mapping[str, Any],

@@ -254,6 +254,26 @@ def test_contacts_add_up_to_the_force_on_the_body():
         np.testing.assert_allclose(force, [sim["ice_force_x"], sim["ice_force_y"]], rtol=1e-9)
 
 
+def test_arrays_are_what_they_were_when_they_were_asked_for():
+    """Copies: steps, the end of the simulation and what is written into them leave array and simulation alone. The
+    window sorts bodies anew as it moves on."""
+    names = ("positions", "velocities", "masses", "contacts")
+    with bergtow.Simulation(WINDOW, threads=1) as sim, bergtow.Simulation(WINDOW, threads=1) as other:
+        for s in (sim, other):
+            s.step(20)
+        kept = {name: getattr(sim, name) for name in names}
+        then = {name: values.copy() for name, values in kept.items()}
+        assert all(values.size and values.base is None for values in kept.values())
+        sim.positions[:] = sim.velocities[:] = math.nan
+        while sim.steps_left:
+            for s in (sim, other):
+                s.step(10)
+            assert sim.state_hash == other.state_hash
+            assert not np.array_equal(sim.positions, kept["positions"])
+    for name in names:
+        assert kept[name].tobytes() == then[name].tobytes(), name
+
+
 def test_bodies_are_changed_by_hand_within_limits():
     with bergtow.Simulation(changed(SHORT, ice__concentration=0.1, tow__speed=0.01), threads=1) as sim:
         place = sim.positions
