@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
 """The documentation names what there is: links, files, names in the code, commands, keys, make targets; its example
-cases are valid."""
+cases are valid, and its calls are taken by the command lines of program and scripts."""
 import fnmatch
 import functools
+import itertools
 import json
 import re
 import shlex
+import subprocess
+import sys
 
 import pytest
 
-from harness import DONE, ROOT, call
+from harness import DONE, ROOT, call, environment
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
@@ -46,11 +49,30 @@ def commands(text):
     return [re.sub(r"(^|\s)#\s.*", "", line) for some in lines for line in some]
 
 
-def calls(text):
-    """Each call of the program in a code block: the line, and its words after the program."""
-    for line in commands(text):
-        if m := re.search(r"(?:^|\s)(?:build/\w+/)?bergtow\s+(\S.*)", line):
+def spans(text):
+    """Code within lines."""
+    return [re.sub(r"\s+", " ", s) for s in re.findall(r"`([^`]+)`", without_fences(text).replace(r"\|", "/"))]
+
+
+def calls(text, within_lines=True):
+    """Each call of the program: the line, and its words after the program."""
+    for line in commands(text) + (spans(text) if within_lines else []):
+        if m := re.search(r"(?:^|\s)(?:build/\w+/)?bergtow\s+([a-z-].*)", line):
             yield line, shlex.split(re.sub(r"[|>].*", "", m[1]))
+
+
+def script_calls(path, within_lines=True):
+    """Each call of a script of Python on a page: the line, its path and its words; of a row of a table that begins with
+    one also the options that stand alone in it, one a call."""
+    text = path.read_text()
+    for line in commands(text) + (spans(text) if within_lines else []):
+        m = re.match(r"(?:/usr/bin/python3 )?([\w/]+\.py)(?: (.*))?$", line.strip())
+        if m and (file := script(m[1], path.parent)):
+            yield line, file, shlex.split(re.sub(r"[|>&].*", "", m[2] or ""))
+    for row in re.findall(r"^\| `\w+\.py .*", text, re.M) if within_lines else []:
+        first, *rest = spans(row)
+        for option in (s for s in rest if s.startswith("--")):
+            yield first, script(first.split()[0], path.parent), option.split()
 
 
 def code(text):
@@ -82,6 +104,21 @@ def options(command):
     done = call(command, "--help")
     assert done.returncode == DONE, command
     return set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", done.stdout))
+
+
+@functools.cache
+def script(name, beside):
+    """A script that a page in the folder `beside` names, with its folder or alone; None for one that the reader
+    makes."""
+    found = [beside / name, ROOT / name, *(p for p in files() if p.name == name and p.parent.parent == ROOT)]
+    return next((p for p in found if p.is_file()), None)
+
+
+@functools.cache
+def of_script(path, *words):
+    """A script called with these words."""
+    return subprocess.run([sys.executable, path, *words], capture_output=True, text=True, cwd=ROOT, timeout=60,
+                          env=environment(MPLBACKEND="agg"))
 
 
 @functools.cache
@@ -171,6 +208,42 @@ def test_commands_and_options_are_known(path):
         assert {w.split("=")[0] for w in words[1:] if re.match("-.", w)} <= options(words[0]), line
         assert {b.split("=")[0] for a, b in zip(words, words[1:]) if a in ("--set", "-s")} <= keys(), line
         assert all((ROOT / w).exists() for w in words if w.startswith("cases/")), line
+
+
+@every_page
+def test_scripts_and_their_options_are_known(path):
+    found = list(script_calls(path))
+    assert len(found) > 40 or path.parent.name != "postproc"
+    for line, file, words in found:
+        assert all((ROOT / w).exists() for w in words if w.startswith(("cases/", "postproc/"))), line
+        wanted = {w.split("=")[0] for w in words if re.match("-.", w)}
+        if wanted:
+            said = of_script(file, *itertools.takewhile(lambda w: w[0] != "-", words), "--help").stdout
+            assert wanted <= set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", said)), line
+
+
+@every_page
+def test_command_lines_are_taken(path):
+    """By the parser of the command, the values of options too: a --help at the end ends the call when every word before
+    it has been read."""
+    lines = [(line, functools.partial(call, *words))
+             for line, words in calls(path.read_text(), within_lines=False) if words[0] in COMMANDS]
+    lines += [(line, functools.partial(of_script, file, *words))
+              for line, file, words in script_calls(path, within_lines=False) if words]
+    for line, called in lines:
+        done = called("--help")
+        assert done.returncode == DONE and not done.stderr, f"{line}: {done.stderr}"
+
+
+@every_page
+def test_cases_are_valid_with_what_a_call_sets(path):
+    """What takes no time, check and estimate, is called as it stands."""
+    for line, words in calls(path.read_text()):
+        if words[0] in COMMANDS and len(words) > 1 and words[1].startswith("cases/"):
+            values = [b for a, b in zip(words, words[1:]) if a in ("--set", "-s")]
+            quick = ["check", words[1], *(w for value in values for w in ("--set", value))]
+            done = call(*(words if words[0] in ("check", "estimate") else quick))
+            assert done.returncode == DONE, f"{line}: {done.stderr}"
 
 
 def test_the_manual_has_every_command_and_option():
