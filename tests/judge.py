@@ -35,6 +35,9 @@ def may_be_null(path, case, summary):
         (r".*_se_n|sd_.*|window\.n_independent|window\.correlation_time_s", window < 3 or not body),
         (r"budget\..*relative", True),  # over the largest force, which may be 0
         (r"reference\.ratio", not body or reference == 0),
+        (r"domain", not body),
+        (r"domain\.body_widths_needed", summary["concentration"] < 0.445 or value_of(case, "domain.sides") == "open"
+         or summary["n_floes"] == 0),
         (r"sweep_bytes_per_contact|lead\.mean_piece_m", True),  # no contact in the last step, no piece
         (r"memory_per_floe_b|ns_per_floe_step|max_overlap_relative", summary["n_floes"] == 0),
         (r"impacts.*", True),

@@ -50,7 +50,7 @@ class Refused(Exception):
 def called(folder, *words, ranks=1, env=None):
     mpi = launcher(ranks) if ranks > 1 else []
     p = subprocess.run([*mpi, BERGTOW, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=120,
-                       env=env or environment(OMP_NUM_THREADS=1, **faults.ROOT))
+                       env=env or environment(OMP_NUM_THREADS=1))
     return p.returncode, p.stderr
 
 
