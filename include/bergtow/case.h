@@ -247,7 +247,7 @@ typedef struct bt_case {
     struct {
         double p_star, p_s;      ///< ice strength Pa and capture threshold N/m of Lichey and Hellmer, at full scale
         double c_si;             ///< drag coefficient of ice on the body
-        double kappa, kappa_low, kappa_high; ///< work of rafting / potential energy gained
+        double kappa, kappa_low, kappa_high; ///< 2 × work of rafting / potential energy gained
         double phi_j;            ///< concentration to which ice is swept together
         double length_scale;     ///< full scale / this case
     } estimate;

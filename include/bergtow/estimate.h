@@ -12,7 +12,8 @@
 //   Løset 2017; their formula is not at hand, so each of these is ours and has a name]:
 //     compaction     F = P W                              the strip is pressed against ice of strength P
 //     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W    the ice of the strip is pushed onto or under other ice; κ:
-//                                                         work over potential energy, of which a range is given
+//                                                         twice the work over the potential energy that is
+//                                                         gained (contact/raft.h), of which a range is given
 //     momentum       F = ρ_i h W V² A φ/(φ − A)           the ice of the strip is swept together to φ, with the front
 //                                                         at V φ/(φ − A)
 //   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²   resting disc-like floes of radius r, each met once by

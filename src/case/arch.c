@@ -56,6 +56,6 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "
                       "load has no upper bound; read it as a property of this model, or let floes raft "
-                      "(ice.rafting.kappa, 5 to 17) or crush (ice.crushing.pressure)",
+                      "(ice.rafting.kappa, 10 to 34) or crush (ice.crushing.pressure)",
                       100 * a->concentration, 100 * BT_BOUND_CONCENTRATION);
 }

@@ -198,7 +198,7 @@ static void check_sizes(const check *k)
         bt_check_fault(k, "ice.rafting.kappa",
                        "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying "
                        "over each other; "
-                       "0 = they do not, 5 to 17 in the literature",
+                       "0 = they do not, 10 to 34 is twice the published ratios of work to energy",
                        c->ice.rafting_kappa);
     if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
         bt_check_fault(k, "ice.density",

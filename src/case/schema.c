@@ -135,8 +135,9 @@ bt_key bt_case_keys[] = {
          "least length of a contact / thickness of the floe that is crushed, assumed"),
     REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
          "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 "
-         "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = "
-         "without loss; 5 to 17, assumed [Rothrock 1975; Parmerter 1975; Hopkins 1998]"),
+         "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = without loss. Work / potential energy gained is "
+         "half of it: the ratio of 17 for pressure ridges [Flato & Hibler 1995] is 34, those of 5 to 17 are 10 to 34; "
+         "which holds for rafting is assumed"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]",
          "added moment of inertia of a floe / its own, assumed"),
@@ -430,11 +431,11 @@ bt_key bt_case_keys[] = {
     REAL("estimate.c_si", estimate.c_si, RATIO, "1", "[0, 100]",
          "drag coefficient of sea ice on the body's side [Lichey & Hellmer 2001]"),
     REAL("estimate.kappa", estimate.kappa, RATIO, "11", "[1, 100]",
-         "work of rafting / potential energy gained, the middle of the range, assumed"),
+         "as ice.rafting.kappa, twice the work of rafting / potential energy gained; assumed"),
     REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]",
          "low end of the range of estimate.kappa, assumed"),
     REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]",
-         "high end of the range of estimate.kappa, that of pressure ridges [Flato & Hibler 1995]; for rafting assumed"),
+         "high end of the range of estimate.kappa, assumed; pressure ridges have 34 [ratio of 17, Flato & Hibler 1995]"),
     REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]",
          "concentration to which the body sweeps ice together, in the momentum closure and towards a wall ahead, "
          "assumed"),
