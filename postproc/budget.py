@@ -23,7 +23,7 @@ import stat_load
 from bergtow_read import RunError
 from case_runs import STOPPED, program
 from ensemble_read import Ensemble
-from loads_text import hours_text
+from text_table import hours_text
 
 import h5py
 import numpy as np

@@ -5,7 +5,7 @@ from itertools import zip_longest
 import numpy as np
 
 import text_table
-from text_table import number, pair, scale, table
+from text_table import hours_text, number, pair, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %
@@ -14,10 +14,6 @@ MOST_NAMED = 5  # conditions of a warning
 
 def _towed(s):
     return [c for c in s["conditions"] if c["design"]["tow"]]
-
-
-def hours_text(hours):
-    return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
 
 
 def asked(s):

@@ -15,8 +15,10 @@ import stat_load
 import stat_mean
 import stat_profile
 from bergtow_read import Run, RunError
-from text_table import quantity, short
+from text_table import hours_text, quantity, short
 
+LOCKS = 60          # body widths that ice asks for which locks as the body displaces it (src/case/arch.c)
+LONG = 2.0          # the tow of the statement / the tow simulated: beyond, a longer load than any simulated is meant
 FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
 WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
 SHORT_FIELDS = stat_profile.LEAST_FIELDS
@@ -138,6 +140,11 @@ def _of_the_sample(e, rows, c, load):
         out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
     if "refused" in d:
         return out + [("no value", d["refused"])]
+    hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
+    if hours > LONG * simulated > 0 and np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0) >= LOCKS:
+        out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
+                    "for tows of the length simulated, one after the other",
+                    f"{hours_text(hours)} against {hours_text(simulated)}"))
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",

@@ -5,6 +5,10 @@ import numpy as np
 FAR = 10.0  # times a level: an end beyond bounds nothing
 
 
+def hours_text(hours):
+    return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
+
+
 def table(head, rows, markdown):
     """Columns of a head and rows of texts; the first is left-aligned, the others right."""
     if markdown:

@@ -435,7 +435,7 @@ bt_key bt_case_keys[] = {
     REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]",
          "low end of the range of estimate.kappa, assumed"),
     REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]",
-         "high end of the range of estimate.kappa, assumed; pressure ridges have 34 [ratio of 17, Flato & Hibler 1995]"),
+         "high end of the range of estimate.kappa, assumed; pressure ridges have 34 [ratio 17, Flato & Hibler 1995]"),
     REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]",
          "concentration to which the body sweeps ice together, in the momentum closure and towards a wall ahead, "
          "assumed"),

@@ -7,8 +7,8 @@
 // Without any loss an edge that advances would need 2 · ½ ρ_i (1 − ρ_i/ρ_w) g h² per length. With losses (edges that
 // break, rubble that rubs) it needs
 //     q0 = κ ½ ρ_i (1 − ρ_i/ρ_w) g h²   N/m,   κ >= 2
-// with h of the thinner floe. The work is κ/2 times the energy gained by equal sheets. Published ratios of the two go up
-// to 17, for pressure ridges (Flato & Hibler 1995): 5 to 17 is a κ of 10 to 34. Which of them holds for rafting is
+// with h of the thinner floe. The work is κ/2 times the energy gained by equal sheets. Published ratios of the two go
+// up to 17, for pressure ridges (Flato & Hibler 1995): 5 to 17 is a κ of 10 to 34. Which of them holds for rafting is
 // assumed (ice.rafting.kappa). Sheets raft whole up to h ≈ 14.2 (1 − ν²) σ²/(ρ_w g E) (Parmerter 1975; 0.17 m for
 // common values); thicker ones ridge, which a larger κ stands for.
 //

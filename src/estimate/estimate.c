@@ -116,7 +116,8 @@ static bt_estimate_def estimates[BT_MAX_ESTIMATES] = {
     [BT_EST_RAFTING] = {.name = "marchenko_rafting",
                         .label = "Marchenko, rafting",
                         .formula = "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
-                        .source = "our closure of Marchenko et al. 2010; kappa assumed, 34 for pressure ridges (Flato & Hibler 1995)",
+                        .source = "our closure of Marchenko et al. 2010; kappa assumed, 34 for pressure ridges (Flato "
+                                  "& Hibler 1995)",
                         .at = rafting},
     [BT_EST_MOMENTUM] = {.name = "marchenko_momentum",
                          .label = "Marchenko, momentum",

@@ -159,7 +159,8 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
             dense = a > 0.8
             # of an earlier program the warning alone says it
             warned = ["domain.width: 15 body widths", "ice.concentration: 90 %"] if dense and earlier else []
-            domain = {} if earlier else {"domain_body_widths": 15, "domain_load_unbounded": dense and pressure == 0,
+            domain = {} if earlier else {"domain_body_widths": 15, "sim_time_s": N,
+                                         "domain_load_unbounded": dense and pressure == 0,
                                          "domain_body_widths_needed": 60 if dense else np.nan}
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
                       "line_tension_2": (0.98 + 0.05 * c) * x,
@@ -218,6 +219,8 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     warnings = {w["what"] for w in second["warnings"]}
     assert any("no upper bound" in w for w in warnings) and any("domain is narrow" in w for w in warnings)
     assert not any("no upper bound" in w["what"] or "narrow" in w["what"] for w in first["warnings"])
+    assert ["24 h against 33.3 min"] == [w["detail"] for w in second["warnings"] if "length of the tow" in w["what"]]
+    assert not any("length of the tow" in w["what"] for w in first["warnings"])
     assert ["15 body widths; 60 are asked for"] == [w["detail"] for w in second["warnings"] if "narrow" in w["what"]]
     assert any("extrapolated to more than 10 times" in w["what"] for w in first["warnings"])
     assert "WARNING: Rigid floes so dense that they jam" in text and "concentration 90 % (90 %)" in text
