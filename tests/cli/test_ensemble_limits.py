@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness import BERGTOW, CASE, DONE, SIGNAL, TOW, USAGE, call, changed, differing, environment, launcher, write_case
-from test_ensemble import BASE, ROOT, STUDY, ensemble, journal, prepare
+from test_ensemble import BASE, STUDY, ensemble, journal, prepare
 
 LONG = changed(TOW, run__duration=3000, output__window_start=5, domain__length=500)
 
@@ -74,7 +74,7 @@ def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
     command = launcher(2) if ranks > 1 else []
     for k in range(3):
         result = subprocess.run([*command, BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--steps",
-                                 "80"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1, **ROOT), capture_output=True,
+                                 "80"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), capture_output=True,
                                 text=True, timeout=120)
         if k < 2:
             assert result.returncode == SIGNAL and "12 members are left; the same call goes on" in result.stderr
