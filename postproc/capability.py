@@ -11,7 +11,6 @@ line that may part; a prescribed speed is kept whatever it takes. The search is 
 a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
 """
 import argparse
-import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ import bracket
 import findings
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case
-from case_runs import SPENT, CaseRuns, above_zero, program
+from case_runs import SPENT, CaseRuns, above_zero, checked, program
 
 import numpy as np
 
@@ -180,12 +179,7 @@ def found_of(c, least):
 
 def resolved(binary, case, sets):
     """{key: text} of the case with keys replaced, as the program reads it. Errors: RunError in the program's words."""
-    done = subprocess.run([str(binary), "check", str(case), "--scale", "1", *(w for t in sets for w in ("--set", t))],
-                          capture_output=True, text=True)
-    if done.returncode:
-        said = (done.stderr.strip().splitlines() or ["the case is refused"])[0].removeprefix("bergtow: ")
-        raise RunError(case, said, "mend it")
-    return parse_case(done.stdout)
+    return parse_case(checked(binary, case, sets, "--scale", "1"))
 
 
 def number_of(binary, case, sets, key, text):

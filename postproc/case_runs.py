@@ -129,3 +129,13 @@ def program():
     if not os.access(path, os.X_OK):
         raise RunError(path, "no such program", "build it with make, or name it in BERGTOW")
     return path.resolve()
+
+
+def checked(binary, case, sets, *words):
+    """What `bergtow check` prints of a case with keys replaced. Errors: RunError in the program's words."""
+    done = subprocess.run([str(binary), "check", str(case), *words, *(w for t in sets for w in ("--set", t))],
+                          capture_output=True, text=True)
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["the case is refused"])[0].removeprefix("bergtow: ")
+        raise RunError(case, said, "mend it")
+    return done.stdout

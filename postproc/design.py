@@ -31,7 +31,7 @@ import pdf
 import report
 from bergtow_read import Run, RunError
 from case_file import contents, files, is_study, section
-from case_runs import STOPPED, above_zero, program
+from case_runs import STOPPED, above_zero, checked, program
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
 from report_case import TITLE_BLOCK
@@ -109,22 +109,12 @@ def title_of(case, name, values):
     return ": ".join(part for part in (str(title or name), words) if part)
 
 
-def checked(work, a, concentration):
-    """What `bergtow check` says of the case at a concentration. Errors: RunError."""
-    sets = [part for text in [*a.set, f"ice.concentration={concentration!r}"] for part in ("--set", text)]
-    done = subprocess.run([str(work.program), "check", str(a.file), "--json", *sets], capture_output=True, text=True)
-    if done.returncode:
-        raise RunError(a.file, (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0],
-                       "mend the case")
-    return json.loads(done.stdout)
-
-
 def wide_enough(domain):
     """The width, m, of three digits, that the ice in a domain needs; None where it is there, or cannot be had."""
-    widths, needed = domain["body_widths"], domain["body_widths_needed"]
-    if domain["sides"] != "periodic images" or not widths or not needed or needed <= widths:
+    there, needed = domain["body_widths"], domain["body_widths_needed"]
+    if domain["sides"] != "periodic images" or not there or not needed or needed <= there:
         return None
-    width = domain["width_m"] * needed / widths
+    width = domain["width_m"] * needed / there
     digit = 10.0 ** (math.floor(math.log10(width)) - 2)
     return round(math.ceil(width / digit) * digit, 6)
 
@@ -135,12 +125,13 @@ def widths(work, a, case):
     placed = [key for key in PLACED if says(case, *key.split(".")) is not None]
     if a.keep_width or reads_ice(case) or placed or replaced & {"domain.width", *PLACED}:
         return {}
-    found = {c: wide_enough(checked(work, a, c)["domain"]) for c in a.concentrations}
+    found = {c: wide_enough(json.loads(checked(work.program, a.file, [*a.set, f"ice.concentration={c!r}"], "--json"))
+                            ["domain"]) for c in a.concentrations}
     return {c: f"{width:g} m" for c, width in found.items() if width}
 
 
-def write_study(a, case, repeats):
-    """The study of a case: DIR/design.yml. Errors: RunError."""
+def write_study(a, case, repeats, wider):
+    """The study of a case: DIR/design.yml. wider: domain.width by concentration, as of widths. Errors: RunError."""
     values = [] if reads_ice(case) else a.concentrations
     study = {
         "title": a.title or title_of(case, a.file.stem, values),
@@ -148,8 +139,8 @@ def write_study(a, case, repeats):
     }
     if values:
         study["parameters"] = {"ice.concentration": values}
-    if a.widths:
-        study["with"] = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in a.widths.items()}
+    if wider:
+        study["with"] = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
     if says(case, "output", "panels") is None and says(case, "tow", "mode") != "none":
         study["set"] = {"output.panels": True}
     path = a.output / "design.yml"
@@ -185,11 +176,11 @@ def seconds_of_the_longest(e):
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
     n = min(FIRST, a.fields)
-    a.widths = widths(work, a, case)
-    for c, width in a.widths.items():
+    wider = widths(work, a, case)
+    for c, width in wider.items():
         print(f"at {100 * c:g} % the domain is made {width} wide: narrower, its periodic images would carry part "
               "of the load (--keep-width: leave it as it is)")
-    whole_round = work.ensemble(write_study(a, case, n))
+    whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_done(Ensemble(a.output)) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on")
@@ -202,13 +193,13 @@ def run_case(work, a, case):
         if more < 1:
             break
         start = time.monotonic()
-        whole_round = work.ensemble(write_study(a, case, n + more))
+        whole_round = work.ensemble(write_study(a, case, n + more, wider))
         rate = (time.monotonic() - start) / more
         n += more
     if not whole_round:
         n = max(1, fields_done(Ensemble(a.output)))
         work.end = np.inf  # nothing is left to run; the members are gathered once more
-        work.ensemble(write_study(a, case, n))
+        work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
         need = a.budget * FEW / n
         print(f"design.py: warning: {n} fields say nothing of the scatter between them; {FEW} need some {need:.0f} min "

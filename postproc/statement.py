@@ -108,7 +108,7 @@ def _of_the_case(e, rows, case, tow):
     elif unbounded(e, rows):
         out.append(("rigid floes so dense that they jam: nothing in the model limits the force of a jam, so "
                     "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
-                    f"{100 * np.nanmax(e.summary['concentration'][rows]):.0f} %"))
+                    f"{100 * np.nanmax(_numbers(e, 'concentration', rows), initial=0.0):.0f} %"))
     if case is not None and case.mode == "speed":
         out.append(("the speed is prescribed: neither vessel nor line yields", ""))
     if narrow := domain(e, rows):

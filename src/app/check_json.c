@@ -18,7 +18,7 @@ static void write_domain(bt_json *j, const bt_case *c, const bt_check_ice *n)
     bt_json_number(j, "width_m", c->domain.width);
     bt_json_string(j, "sides", a.sides);
     bt_json_number(j, "body_widths", a.bodies);
-    bt_json_number(j, "body_widths_needed", a.held && a.widths > 0 ? a.widths : NAN);
+    bt_json_number(j, "body_widths_needed", a.needed);
     bt_json_bool(j, "load_unbounded", a.unbounded);
     bt_json_close(j, '}');
 }

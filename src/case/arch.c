@@ -9,7 +9,7 @@
 #include "case/case_check.h"
 
 /// Body widths that ice from this concentration on needs.
-static const struct { double concentration, widths; } needed[] = {{0.45, 10}, {0.7, 30}, {0.85, 60}};
+static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.7, 30}, {0.85, 60}};
 
 /// δ of arch.h, from this concentration on.
 static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, {0.95, 0.003}};
@@ -29,16 +29,17 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
                  .bodies = c->domain.width / across,
                  .floes = floe_size > 0 ? c->domain.width / floe_size : NAN};
     a.sides = open ? "open sides" : c->domain.sides == BT_BOUND_PERIODIC ? "periodic images" : "walls";
-    for (size_t k = 0; k < sizeof needed / sizeof *needed; k++)
-        if (reaches(concentration, needed[k].concentration)) a.widths = needed[k].widths;
+    const bool beside = n > 0 && floe_size > 0; // ice beside a body
+    a.needed = NAN;
+    for (size_t k = 0; beside && !open && k < sizeof asked / sizeof *asked; k++)
+        if (reaches(concentration, asked[k].concentration)) a.needed = asked[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
     for (size_t k = 0; k < sizeof locked / sizeof *locked; k++)
-        if (reaches(concentration, locked[k].concentration) && way > 0)
-            a.widths = bt_max(a.widths, ceil(2 * sqrt(way / (BT_PI * locked[k].slack * across))));
-    a.held = !open && n > 0 && floe_size > 0;
-    a.possible = a.held && a.bodies < a.widths;
+        if (a.needed > 0 && way > 0 && reaches(concentration, locked[k].concentration))
+            a.needed = bt_max(a.needed, ceil(2 * sqrt(way / (BT_PI * locked[k].slack * across))));
+    a.possible = a.bodies < a.needed;
     a.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
-    a.unbounded = a.rigid && n > 0 && floe_size > 0 && reaches(concentration, BT_BOUND_CONCENTRATION);
+    a.unbounded = a.rigid && beside && reaches(concentration, BT_BOUND_CONCENTRATION);
     return a;
 }
 
@@ -51,7 +52,7 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
                       "domain.width: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
-                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->widths);
+                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->needed);
     if (a->unbounded)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "

@@ -29,8 +29,8 @@ typedef struct bt_arch {
     double concentration; ///< as given
     double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
     double floes;         ///< the same in mean floe sizes; NaN without floes
-    double widths;        ///< of the body: a domain as wide is not expected to show; 0 at these concentrations
-    bool held;            ///< ice beside a body that walls or images hold: only there is `widths` asked for
+    double needed;        ///< body widths of a domain that is not expected to show; NaN where nothing holds the ice at
+                          ///< the sides, or it is too loose to matter
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush
     bool unbounded;       ///< rigid and dense, around a towed body: no upper bound of its load

@@ -51,8 +51,8 @@
 // Between which bodies: floes of the field and by hand, also fixed ones, whose outlines are both convex. Not the
 // towed body (a deep hull does not raft), not walls, nothing without ice; a floe in convex parts stays rigid.
 // Several floes on one spot are treated pair by pair: N sheets of h make N(N − 1)/2 pairs, and (N h)² − N h² = N(N −
-// 1) h² is as many times what it is for two, so that the energy of a pile, and the buoyancy that presses its layers
-// together, come out right.
+// 1) h² is as many times what it is for two, so that the energy of a pile, and the sum of the pressures between its
+// layers, come out right; friction in a pile that is sheared from top to bottom is (N + 1)/3 times too much.
 #ifndef BERGTOW_RAFT_H
 #define BERGTOW_RAFT_H
 

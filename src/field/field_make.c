@@ -252,8 +252,8 @@ static bt_status make(const bt_case *c, const bt_region *y, const bt_sizes *size
     if (status != BT_OK) return status;
     bt_field_sort(f, y);
     double size, gap = mean_gap(y, f, &size);
-    // Rarely (one of 1,500 random cases) a floe has come so deep into another that resting does not part them: they
-    // fly on.
+    // A floe that turns fast may be deep in another for a moment. Flying on parts the two, and resting does not: rarely
+    // (one of 1,500 random cases) the shake ends in such a moment.
     for (int again = 0; status == BT_OK && again <= MORE_SHAKES; again++) {
         const double length = again ? MORE_GAPS : c->ice.shake;
         status = bt_field_shake(c, y, f, length * gap, bt_min(STRIDE * gap, MOST * size),

@@ -63,10 +63,6 @@ static double window_residual(const view *v) { return number_or_nan(v->s->window
 static double peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, false); }
 static double start_peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, true); }
 static bool has_body(const view *v) { return v->s->body; }
-static double widths_needed(const view *v)
-{
-    return number_or_nan(v->s->arch.held && v->s->arch.widths > 0, v->s->arch.widths);
-}
 static bool has_reference(const view *v) { return !isnan(v->c->reference.mean_force); }
 
 static bool has_impacts(const view *v) { return v->s->impacts; }
@@ -220,7 +216,7 @@ const bt_json_key bt_summary_keys[] = {
     OF_TOTALS("mean_size_m", mean_size, "m", "mean equivalent diameter of the floes"),
     GROUP("domain", has_body, "whether the forces are a property of the domain"),
     OF_SUMMARY("domain.body_widths", arch.bodies, "1", "width of the domain in widths of the body across the tow"),
-    NUMBER("domain.body_widths_needed", widths_needed, "1",
+    OF_SUMMARY("domain.body_widths_needed", arch.needed, "1",
         "of a domain whose width is not expected to show (assumed), where walls or periodic images hold dense ice"),
     OF_SUMMARY("domain.load_unbounded", arch.unbounded, "1",
         "dense ice of rigid floes, whose load on the body has no upper bound in the model"),

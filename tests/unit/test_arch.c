@@ -43,17 +43,17 @@ static void a_long_tow_needs_more_width(void **state)
     bt_case c = narrow();
     c.tow.mode = BT_TOW_SPEED, c.tow.speed = 1, c.tow.ramp = 20;
     c.run.duration = 40; // 30 m
-    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 60);
+    assert_true(bt_arch_of(&c, 0.9, 0.5).needed == 60);
     c.run.duration = 210; // 200 m, 100 body widths
-    assert_true(bt_arch_of(&c, 0.89, 0.5).widths == 60);
-    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 116);  // 115.8
-    assert_true(bt_arch_of(&c, 0.95, 0.5).widths == 207); // 206.01, δ = 0.003
+    assert_true(bt_arch_of(&c, 0.89, 0.5).needed == 60);
+    assert_true(bt_arch_of(&c, 0.9, 0.5).needed == 116);  // 115.8
+    assert_true(bt_arch_of(&c, 0.95, 0.5).needed == 207); // 206.01, δ = 0.003
     c.domain.width = 231;
     assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
     c.domain.width = 232;
     assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
     c.tow.mode = BT_TOW_NONE;
-    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 60);
+    assert_true(bt_arch_of(&c, 0.9, 0.5).needed == 60);
 }
 
 static void dense_ice_between_near_sides_can_arch(void **state)
@@ -73,6 +73,12 @@ static void dense_ice_between_near_sides_can_arch(void **state)
     assert_false(bt_arch_of(&c, 0.44, 0.5).possible);
     c.domain.width = 20;
     assert_false(bt_arch_of(&c, 0.5, 0.5).possible);
+    // ice as made misses what was asked for in the last digits; loose ice, open sides, no floes: nothing is asked for
+    assert_true(bt_arch_of(&c, nextafter(0.85, 0), 0.5).needed == 60);
+    assert_true(isnan(bt_arch_of(&c, 0.44, 0.5).needed) && isnan(bt_arch_of(&c, 0.85, 0).needed));
+    c.domain.sides = BT_BOUND_OPEN;
+    assert_true(isnan(bt_arch_of(&c, 0.85, 0.5).needed));
+    c.domain.sides = BT_BOUND_WALL;
     c.domain.width = 119;
     c.domain.sides = BT_BOUND_PERIODIC;
     assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
