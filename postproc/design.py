@@ -173,6 +173,14 @@ def seconds_of_the_longest(e):
     return out
 
 
+def more_fields(left, rate, replay, n, most):
+    """Fields that n are followed by in `left` s, and the seconds that are kept for a replay: none, until there are
+    FEW."""
+    beside = min(int(MARGIN * (left - replay) / rate), most - n)
+    few = min(int(MARGIN * left / rate), min(FEW, most) - n)
+    return (beside, replay) if beside >= few else (few, 0.0)
+
+
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
     n = min(FIRST, a.fields)
@@ -185,13 +193,14 @@ def run_case(work, a, case):
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on")
     rate = seconds_a_field(Ensemble(a.output)) / work.jobs
-    if not a.no_replay and not reads_ice(case):
-        work.end -= seconds_of_the_longest(Ensemble(a.output))
+    replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Ensemble(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
+    end = work.end
     while whole_round and n < a.fields:
-        more = min(int(MARGIN * work.left() / rate), a.fields - n)
+        more, kept = more_fields(end - time.monotonic(), rate, replay, n, a.fields)
         if more < 1:
             break
+        work.end = end - kept
         start = time.monotonic()
         whole_round = work.ensemble(write_study(a, case, n + more, wider))
         rate = (time.monotonic() - start) / more
@@ -201,7 +210,7 @@ def run_case(work, a, case):
         work.end = np.inf  # nothing is left to run; the members are gathered once more
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
-        need = a.budget * FEW / n
+        need = a.budget + max(0.0, (FEW - n) * rate - max(0.0, end - time.monotonic())) / 60
         print(f"design.py: warning: {n} fields say nothing of the scatter between them; {FEW} need some {need:.0f} min "
               "(--budget), or a shorter run (--set run.duration=1h)", file=sys.stderr)
 

@@ -28,7 +28,7 @@ MIN_INDEPENDENT = 20  # samples below which the program itself calls a window sh
 
 #: kinds of doubt about a member, and what each means
 DOUBTS = {
-    "unconverged": "steps met the sweep limit before the tolerance",
+    "unconverged": "steps met the limit of work before the tolerance",
     "jammed": "the towed body stood still while the tow asked for motion",
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
                 "solved",

@@ -111,8 +111,8 @@ class Replay:
             "edges": [run.case.get("domain.ends", ""),
                       run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k)
-                      for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK")
-                      }, **self._bodies(frames), "curve": curve(run)
+                      for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
+                      }, "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)
         }
 
     @property

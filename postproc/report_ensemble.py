@@ -166,10 +166,23 @@ def governing(s):
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
     value = worth(d["value"], *d["interval_95"])[0]
-    said = (f"Largest of these: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE)} "
+    said = without_value(s, d["value"])
+    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE)} "
             f"tonne-force); upper end of its interval {both(d['interval_95'][1])}")
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
+
+
+def without_value(s, value):
+    """A sentence on the conditions that have no design tow force, "" where all have one."""
+    rest = [c for c in s["conditions"] if not (c["design"]["tow"] and "value" in c["design"]["tow"])]
+    if not rest:
+        return ""
+    names = ", ".join(unbroken(c["label"]) for c in rest)
+    most = max((c["design"]["tow"]["largest"] for c in rest if c["design"]["tow"]), default=np.nan)
+    reached = f", but {report_run.force(most)} in the simulation: the largest value of this study is not known" \
+        if most > value else ""
+    return f"No value for {names}{reached}. "
 
 
 def lines(*some, faint=False):

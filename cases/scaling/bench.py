@@ -39,7 +39,7 @@ SIZES = {"quick": [1000, 2000, 4000], "default": [1000, 2000, 10000, 15000, 3000
 REPEATS = {"quick": 2, "default": 3, "full": 3}
 ONCE_ABOVE = 50000                               # floes: larger fields are run once
 
-PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output"]
+PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output", "project"]
 COLUMNS = ([
     "scene", "asked", "floes", "ranks", "threads", "runs", "steps", "dt_s", "wall_s", "wall_min_s", "wall_max_s",
     "ns_per_floe_step"

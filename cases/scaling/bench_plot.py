@@ -11,8 +11,8 @@ from style import FAINT, INK, plt  # noqa: E402
 
 # Okabe & Ito
 COLOURS = {"tow-80": "#56b4e9", "tow-95": "#0072b2", "compression-80": "#e69f00", "compression-95": "#d55e00"}
-PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output"]
-PHASE_COLOURS = ["#009e73", "#f0e442", "#56b4e9", "#d55e00", "#0072b2", "#cc79a7", "#999999"]
+PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output", "project"]
+PHASE_COLOURS = ["#009e73", "#f0e442", "#56b4e9", "#d55e00", "#0072b2", "#cc79a7", "#999999", "#e69f00"]
 
 
 def read(path):
@@ -85,7 +85,7 @@ def phase_bars(ax, rows):
     chosen = [r for r in rows if r["asked"] == largest]
     left = [0.0] * len(chosen)
     for phase, colour in zip(PHASES, PHASE_COLOURS):
-        share = [100 * (r[phase + "_share"] or 0) for r in chosen]
+        share = [100 * (r.get(phase + "_share") or 0) for r in chosen]
         ax.barh(range(len(chosen)), share, left=left, color=colour, label=phase, height=0.75)
         left = [a + b for a, b in zip(left, share)]
     ax.set_yticks(range(len(chosen)), [f"{r['scene']}, {name_of(*config(r))}" for r in chosen], fontsize=8)

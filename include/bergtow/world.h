@@ -161,18 +161,40 @@ struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
 
+/// Where the wall time of a run goes: X(name, what is in it). The last has come to these later than checkpoints
+/// without it.
+#define BT_WALL_PHASES(X)                                                                                              \
+    X(detect, "labels and storage of bodies, margins, the detection of contacts")                                      \
+    X(colour, "the order of the cells by their colours, and their distribution to threads")                            \
+    X(forces, "current and wind, forces, velocities without contacts")                                                 \
+    X(solve, "the contact solver, restitution included")                                                               \
+    X(advance, "balances, the record of forces and collisions, motion")                                                \
+    X(exchange, "waiting for other ranks")                                                                             \
+    X(output, "series, checks, frames and checkpoints")                                                                \
+    X(project, "what gives way, and the position projection")
+
+/// Wall time by phase, s.
+typedef struct bt_phases {
+#define BT_MEMBER_OF_PHASES(name, text) double name;
+    BT_WALL_PHASES(BT_MEMBER_OF_PHASES)
+#undef BT_MEMBER_OF_PHASES
+} bt_phases;
+
 /// Numbers of the last step.
 typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
     int64_t n_active;        ///< floes in cells that were looked at (the others rest)
     int64_t sweeps, position_sweeps;
+    int64_t position_updates; ///< of contacts by the sweeps of the position projection
     bool projected;          ///< the position projection came to its end, or there was nothing to do
     int64_t unit_updates;    ///< of contacts by the sweeps
     int64_t unit_moves;      ///< of contacts by momentum between sweeps
+    int64_t residual_checks; ///< of contacts by residual passes, and by velocities formed anew for them
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed
     double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s
     bool converged;
+    bool locked;             ///< it did not, and some bodies cannot give way to any load (src/solve/locked.h)
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
@@ -188,7 +210,7 @@ typedef struct bt_step_stats {
     double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of laws that were added
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
-    double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s
+    bt_phases phases;        ///< where its wall time went; `output` is not of the step
 } bt_step_stats;
 
 typedef struct bt_world {

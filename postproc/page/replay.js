@@ -267,6 +267,7 @@ function drawFloes(g, p, C, o) {
         g.fill();
         if (size > 5) g.stroke();
     });
+    if (head.rafts) drawOverlaps(g, bins, o);
     const hover = state.hover;
     if (hover === null || hover < 0) return;
     for (const bin of bins) for (let j = 0; j < bin.length; j += 4) if (bin[j] === hover) {
@@ -278,6 +279,76 @@ function drawFloes(g, p, C, o) {
         g.lineWidth = 1.2;
         g.stroke();
     }
+}
+
+// Floes over each other: the intersections of their outlines, pair by pair, of those that are large enough to be seen.
+// As postproc/rafted.py.
+
+const LEAST_OVERLAP = 1e-3, SEEN = 3;  // of a floe's area: less is the slop of the solver; pixels
+
+// Convex polygon a cut by convex polygon b, both anticlockwise [Sutherland & Hodgman 1974].
+function intersection(a, b) {
+    for (let k = 0; k < b.length && a.length; k++) {
+        const p = b[k], q = b[(k + 1) % b.length], ex = q[0] - p[0], ey = q[1] - p[1], out = [];
+        const side = (v) => ex * (v[1] - p[1]) - ey * (v[0] - p[0]);
+        let from = a[a.length - 1], before = side(from);
+        for (const v of a) {
+            const now = side(v);
+            if ((now >= 0) !== (before >= 0)) {
+                const w = before / (before - now);
+                out.push([from[0] + w * (v[0] - from[0]), from[1] + w * (v[1] - from[1])]);
+            }
+            if (now >= 0) out.push(v);
+            from = v;
+            before = now;
+        }
+        a = out;
+    }
+    return a;
+}
+
+function areaOf(a) {
+    let sum = 0;
+    for (let k = 0, j = a.length - 1; k < a.length; j = k++) sum += a[j][0] * a[k][1] - a[k][0] * a[j][1];
+    return sum / 2;
+}
+
+// Outline at a pose [x, y, yaw].
+function placed(i, x, y, yaw) {
+    const c = Math.cos(yaw), s = Math.sin(yaw);
+    return outlineOf(i).map(([u, v]) => [x + c * u - s * v, y + s * u + c * v]);
+}
+
+function overlaps(bins) {
+    const shown = [], out = [];
+    let widest = 0;
+    for (const bin of bins) for (let j = 0; j < bin.length; j += 4) {
+        const r = data.radius[bin[j]];
+        if (r * state.scale < SEEN) continue;
+        shown.push({i: bin[j], x: bin[j + 1], y: bin[j + 2], yaw: bin[j + 3], r, outline: null});
+        widest = Math.max(widest, r);
+    }
+    shown.sort((a, b) => a.x - b.x);
+    const outline = (f) => f.outline || (f.outline = placed(f.i, f.x, f.y, f.yaw));
+    shown.forEach((a, k) => {
+        for (let m = k + 1; m < shown.length && shown[m].x - a.x < a.r + widest; m++) {
+            const b = shown[m], reach = a.r + b.r;
+            if ((a.x - b.x) ** 2 + (a.y - b.y) ** 2 >= reach * reach) continue;
+            const both = intersection(outline(a), outline(b));
+            if (areaOf(both) > LEAST_OVERLAP * Math.min(data.area[a.i], data.area[b.i])) out.push(both);
+        }
+    });
+    return out;
+}
+
+function drawOverlaps(g, bins, o) {
+    g.fillStyle = head.style.rafted;
+    g.beginPath();
+    for (const polygon of overlaps(bins)) {
+        polygon.forEach((v, k) => g[k ? "lineTo" : "moveTo"](...toScreen(...v, o)));
+        g.closePath();
+    }
+    g.fill();
 }
 
 function outlineOf(i) {

@@ -183,6 +183,8 @@ function legend() {
     $("replay-bar-middle").textContent = at(0.5);
     $("replay-bar-high").textContent = at(1) + (c.above ? " and above" : "");
     $("replay-bar-label").textContent = c.label;
+    $("replay-rafts").hidden = !head.rafts;
+    $("replay-rafts-square").style.background = head.style.rafted;
 }
 
 function draw() {
@@ -413,6 +415,10 @@ window.bergtow = {
     pose: (i) => floePose(i, playhead()),
     value: (kind, i) => value(kind, nearest(), i),
     body: (b) => bodyPose(b, playhead()),
+    overlap: () => {  // area of floes over each other, pair by pair, that is in view, m²
+        const p = playhead();
+        return overlaps(visible(p, centre(p), origin(p))).reduce((sum, polygon) => sum + areaOf(polygon), 0);
+    },
     screen: (i) => {  // where floe i is drawn, CSS pixels from the canvas's corner
         const p = playhead(), C = centre(p), pose = floePose(i, p);
         const x = C[0] + image(pose[0] - C[0], head.period[0]), y = C[1] + image(pose[1] - C[1], head.period[1]);

@@ -268,7 +268,9 @@ void bt_contacts_detect(bt_world *w, bool again)
         bt_pack_scratch_free(&s.pack);
     }
     free(due);
+    const double t0 = bt_clock();
     bt_phases_order(w);
+    w->stats.phases.colour += bt_clock() - t0;
     bt_domain_select(w);
     find_awake(w);
     bt_cells_leave(t);

@@ -33,16 +33,16 @@ typedef struct bt_history {
     /// [n] each, units as in bt_sample; NaN where a step has no such number
     double *column[BT_N_COLUMNS + BT_MAX_ADDED];
     // running totals: bt_history_totals
-    double sum_contacts, sum_sweeps, sum_updates, sum_moves, contact_work;
+    double sum_contacts, sum_sweeps, sum_updates, sum_moves, sum_checks, sum_projected, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
     int64_t crushing_steps;
     double rafting, rafted_area, rafted_energy;  ///< in the last step, as in bt_sample
     double max_rafted_area, rafted_largest, raft_edge_work, raft_friction_work; ///< m², m², J, J
-    int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
+    int64_t unconverged, locked, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
-enum { BT_N_TOTALS = 25, BT_HISTORY_NAME = 80 };
+enum { BT_N_TOTALS = 28, BT_HISTORY_NAME = 80 };
 
 /// A running total: its member of bt_history, what it takes of a step, and how.
 typedef struct bt_total {

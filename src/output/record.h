@@ -43,11 +43,14 @@ typedef struct bt_sample {
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
     double unit_updates, momentum_moves; ///< of contacts, in all sweeps of the step
+    double residual_checks;  ///< of contacts, in all residual passes of the step
+    double position_updates; ///< of contacts, in the sweeps of the position projection
     double unprojected;     ///< 1 if the position projection met its limit
     double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
     double residual_rms;    ///< the same, root mean square over the rows, m/s
     double active;          ///< floes in cells whose contacts were looked at; the others rest
     double unconverged;     ///< 1 if the limit of work came before the tolerance
+    double locked;          ///< 1 if some bodies could not give way to any load, either
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
     double kinetic_energy;  ///< of all dynamic bodies, J
@@ -100,11 +103,6 @@ static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double valu
 /// sample is sound.
 /// has: bit 1 << k for each bt_applies k of the run.
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
-
-/// Wall time by phase of the step, s.
-typedef struct bt_phases {
-    double detect, colour, forces, solve, advance, exchange, output;
-} bt_phases;
 
 struct bt_impacts;
 

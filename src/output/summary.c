@@ -139,9 +139,18 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
         bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
         bt_errors_add(&s->warnings,
-                      "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
-                      "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",
-                      (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance);
+                      "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
+                      "tolerance %.2g m/s); %s",
+                      (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance,
+                      h->locked < h->unconverged ? "raise solver.max_sweeps or lower run.dt"
+                                                 : "more work would not help");
+    if (h->locked)
+        bt_errors_add(&s->warnings,
+                      "in %lld of %lld steps bodies were locked between others that give way to nothing (walls, a body "
+                      "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
+                      "let ice give way (ice.rafting.kappa, ice.crushing.pressure), tow by a line or a vessel "
+                      "(tow.mode), or move the walls away",
+                      (long long)h->locked, (long long)h->n);
     if (h->outrun)
         bt_errors_add(
             &s->warnings,
@@ -222,6 +231,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
     s->updates = h->n ? h->sum_updates / (double)h->n : nan;
     s->moves = h->n ? h->sum_moves / (double)h->n : nan;
+    s->checks = h->n ? h->sum_checks / (double)h->n : nan;
+    s->projected = h->n ? h->sum_projected / (double)h->n : nan;
     s->ns_per_floe_step =
         n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 

@@ -23,7 +23,7 @@ typedef struct bt_summary {
     double balance;                   ///< mean tow − drag − Coriolis − tilt − registered forces − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
-    double contacts, sweeps, updates, moves; ///< means over all steps
+    double contacts, sweeps, updates, moves, checks, projected; ///< means over all steps
     double ns_per_floe_step;
     bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
     double reference_ratio;           ///< mean ice / measured mean, NaN without a reference

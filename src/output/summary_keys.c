@@ -173,6 +173,7 @@ static void write_warnings(bt_json *j, const char *key, const view *v, const voi
 #define OF_WINDOW(...) {BT_JSON_AT(FROM_WINDOW, bt_window, __VA_ARGS__)}
 #define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
 #define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
+#define PHASE(name, text) MACHINE("phases_s." #name, phases.name, "s", "wall time of " text),
 #define MACHINE_SUMMARY(...) {BT_JSON_AT(FROM_SUMMARY, bt_summary, __VA_ARGS__), .machine = true}
 #define WHEN(when_, ...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .when = when_}
 #define BY(kind_, key_, units_, text_) .key = key_, .units = units_, .description = text_, .kind = BT_JSON_##kind_
@@ -336,13 +337,19 @@ const bt_json_key bt_summary_keys[] = {
     {.key = "", .kind = BT_JSON_ADDED, .write = write_added},
     OF_HISTORY("max_overlap_m", max_overlap, "m", "deepest overlap of two bodies"),
     NUMBER("max_overlap_relative", overlap_relative, "1", "the same over the mean floe size"),
-    OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the sweep limit before the tolerance"),
+    OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the limit of work before the tolerance"),
+    OF_HISTORY("locked_steps", locked, "1",
+        "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
     OF_HISTORY("max_residual_m_s", max_residual, "m/s", "largest residual of the contact problem at the end of a step"),
     OF_TOTALS("tolerance_m_s", tolerance, "m/s", "residual at which the sweeps stop"),
     OF_SUMMARY("mean_sweeps", sweeps, "1", "sweeps of the contact solver in a step, mean over all steps"),
     OF_SUMMARY("mean_unit_updates", updates, "1", "updates of single contacts in a step, mean over all steps"),
     OF_SUMMARY("mean_momentum_moves", moves, "1",
         "contacts moved on along their last change in a step, mean over all steps"),
+    OF_SUMMARY("mean_residual_checks", checks, "1",
+        "residuals of single contacts taken in a step, mean over all steps"),
+    OF_SUMMARY("mean_position_updates", projected, "1",
+        "updates of single contacts by the position projection of a step, mean over all steps"),
     OF_HISTORY("unprojected_steps", unprojected, "1", "steps whose position projection met its limit of work"),
     OF_SUMMARY("contacts_mean", contacts, "1", "contact points, mean over all steps"),
     OF_HISTORY("contact_work_j", contact_work, "J", "work of the contact impulses"),
@@ -395,13 +402,7 @@ const bt_json_key bt_summary_keys[] = {
     OF_WINDOW("moving_window.brought_energy_j", brought[2], "J", "kinetic energy of the renewed floes as they entered"),
     MACHINE_SUMMARY("ns_per_floe_step", ns_per_floe_step, "ns", "wall time for each floe and step"),
     GROUP("phases_s", NULL, "wall time by phase of the step"),
-    MACHINE("phases_s.detect", phases.detect, "s", "wall time of the detection of contacts"),
-    MACHINE("phases_s.colour", phases.colour, "s", "wall time of the order of the contacts"),
-    MACHINE("phases_s.forces", phases.forces, "s", "wall time of the forces and prediction"),
-    MACHINE("phases_s.solve", phases.solve, "s", "wall time of the contact solver"),
-    MACHINE("phases_s.advance", phases.advance, "s", "wall time of the motion and projection"),
-    MACHINE("phases_s.exchange", phases.exchange, "s", "wall time of the exchange between ranks"),
-    MACHINE("phases_s.output", phases.output, "s", "wall time of writing"),
+    BT_WALL_PHASES(PHASE)
     TEXT("state_hash", state_hash, "hash of the state at the end, the same for any ranks and threads"),
     OF_TOTALS("stopped", stopped, "", "why the run ended early"),
     WRITTEN("events", write_events, "what happened, the first 40; all are in result.h5"),

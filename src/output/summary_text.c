@@ -11,15 +11,20 @@
 #include "output/summary.h"
 #include "output/summary_window.h"
 
-typedef struct phase_row { const char *name; double seconds; } phase_row;
-#define N_PHASES 7
-
-static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
+/// Shares of the wall time, in one line.
+static void print_phases(const bt_phases *p)
 {
-    const phase_row all[N_PHASES] = {{"detect", p->detect}, {"colour", p->colour}, {"forces", p->forces},
-                                     {"solve", p->solve}, {"advance", p->advance}, {"exchange", p->exchange},
-                                     {"output", p->output}};
-    for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
+#define NAME(name, text) #name,
+#define SECONDS(name, text) p->name,
+    const char *const names[] = {BT_WALL_PHASES(NAME)};
+    const double seconds[] = {BT_WALL_PHASES(SECONDS)};
+#undef NAME
+#undef SECONDS
+    const int n = sizeof names / sizeof *names;
+    double sum = 0;
+    for (int i = 0; i < n; i++) sum += seconds[i];
+    for (int i = 0; i < n; i++)
+        printf(" %s %.1f %%%s", names[i], sum > 0 ? 100 * seconds[i] / sum : 0.0, i + 1 < n ? "," : "\n");
 }
 
 /// Reported series that not every run has, and what the table calls them.
@@ -147,13 +152,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);
     printf("\n ");
-    phase_row rows[N_PHASES];
-    phase_rows(&t->phases, rows);
-    double sum = 0;
-    for (int i = 0; i < N_PHASES; i++) sum += rows[i].seconds;
-    for (int i = 0; i < N_PHASES; i++)
-        printf(" %s %.1f %%%s", rows[i].name, sum > 0 ? 100 * rows[i].seconds / sum : 0.0,
-               i + 1 < N_PHASES ? "," : "\n");
+    print_phases(&t->phases);
     printf("  state hash          %016" PRIx64 "\n", t->state_hash);
     for (size_t i = 0; i < s->warnings.n; i++) printf("  warning: %s\n", s->warnings.text[i]);
 }

@@ -256,8 +256,12 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
         bt_errors_add(
             err,
             "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
-            "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
-            w->step, g->in_a_row);
+            "%s",
+            w->step, g->in_a_row,
+            s->locked != 0 ? "in the last, bodies are locked between others that give way to nothing: let ice give way "
+                             "(ice.rafting.kappa, ice.crushing.pressure), or tow by a line or a vessel (tow.mode)"
+                           : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
+                             "where ice jams");
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

@@ -20,6 +20,7 @@
 #include "output/dump.h"
 #include "output/observe.h"
 #include "solve/batch.h"
+#include "solve/locked.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_check.h"
@@ -223,12 +224,9 @@ static bt_status agree(run *r, bt_status status)
 
 static void add_phases(bt_phases *p, const bt_step_stats *st)
 {
-    p->detect += st->detect_s;
-    p->colour += st->colour_s;
-    p->forces += st->forces_s;
-    p->solve += st->solve_s;
-    p->advance += st->advance_s;
-    p->exchange += st->exchange_s;
+#define ADD(name, text) p->name += st->phases.name;
+    BT_WALL_PHASES(ADD)
+#undef ADD
 }
 
 /// A frame at the first step at or after each multiple of the interval, and at the end.
@@ -264,6 +262,7 @@ static void step_at_pace(bt_world *w, bt_pace *p)
     if (p->now != omp_get_max_threads()) start_threads(p->now);
     const double wall = bt_clock(), cpu = processor_time();
     bt_world_step(w);
+    w->stats.locked = !w->stats.converged && bt_locked(w);
     bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
 }
 

@@ -103,12 +103,21 @@ static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_moved_end(&moved, cell, o, against, t);
 }
 
+void bt_solver_make_shift(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    if (s->shift && w->bodies.n <= s->cap_bodies) return;
+    s->cap_bodies = w->bodies.n > 0 ? w->bodies.n : 1; // a rank may own nothing
+    free(s->shift);
+    s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
+}
+
 void bt_solver_project(bt_world *w)
 {
     bt_solver *s = w->solver;
     const bt_cells *ts = w->cells;
     bt_step_stats *st = &w->stats;
-    st->position_sweeps = 0;
+    st->position_sweeps = st->position_updates = 0;
     st->projected = true;
     bt_totals t = {0};
     bt_phases_any_order(w, find_overlap, NULL, &t);
@@ -116,11 +125,7 @@ void bt_solver_project(bt_world *w)
     s->shifted = t.most > w->par.slop;
     if (!s->shifted) return;
 
-    if (!s->shift || w->bodies.n > s->cap_bodies) { // a rank may own nothing
-        s->cap_bodies = w->bodies.n > 0 ? w->bodies.n : 1;
-        free(s->shift);
-        s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
-    }
+    bt_solver_make_shift(w);
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
         if (k == ts->n - 1 || bt_cells_moves(ts, k))
@@ -142,6 +147,7 @@ void bt_solver_project(bt_world *w)
             work.residual = bt_rounds_sweep(w, &p, &work);
     else bt_rounds_run(w, &p, &work);
     st->position_sweeps = work.sweeps;
+    st->position_updates = work.updates;
     st->projected = work.residual <= p.tolerance;
     bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
 }

@@ -9,9 +9,6 @@
 
 #include "bergtow/world.h"
 
-struct bt_islands *bt_islands_create(void);
-void bt_islands_free(struct bt_islands *s);
-
 /// Collective. Full restitution for every island; false (and nothing to do) when no contact of this step has any.
 bool bt_restitution_begin(bt_world *w);
 

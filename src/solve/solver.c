@@ -12,6 +12,7 @@
 #include "solve/kernel.h"
 #include "contact/pack.h"
 #include "space/phases.h"
+#include "solve/islands.h"
 #include "solve/restitution.h"
 #include "solve/rounds.h"
 
@@ -314,6 +315,7 @@ static void sweep_to_tolerance(bt_world *w)
     st->sweeps += work.sweeps;
     st->unit_updates += work.updates;
     st->unit_moves += work.moves;
+    st->residual_checks += work.checks;
     st->residual = work.residual;
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
     st->converged = work.residual <= p.tolerance;
@@ -328,18 +330,12 @@ void bt_solver_solve(bt_world *w)
     st->restitution_cut = false;
     // the displacements of the last step are over, and their array is of the bodies that were here then
     s->shifted = false;
-    s->prepare_s = 0;
-    st->sweeps = st->unit_updates = st->unit_moves = 0;
-    const double t0 = bt_clock();
+    st->sweeps = st->unit_updates = st->unit_moves = st->residual_checks = 0;
     s->rebounds = bt_restitution_begin(w);
-    s->prepare_s += bt_clock() - t0;
     for (;;) {
         sweep_to_tolerance(w);
         if (!s->rebounds) break;
-        const double t1 = bt_clock();
-        const bool lowered = bt_restitution_lower(w);
-        s->prepare_s += bt_clock() - t1;
-        if (!lowered) break;
+        if (!bt_restitution_lower(w)) break;
         st->restitution_cut = true;
     }
 }

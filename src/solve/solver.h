@@ -51,8 +51,7 @@ typedef struct bt_solver {
     bt_idx cap_bodies;
     bool shifted;                ///< the projection did something this step
     bool rebounds;               ///< some contact of this step has a restitution
-    struct bt_islands *islands;  ///< bodies that touch, while `rebounds`
-    double prepare_s;            ///< wall time of islands and biases in this step, s
+    struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
 } bt_solver;
 
 bt_solver *bt_solver_create(void);
@@ -64,6 +63,9 @@ void bt_solver_free(bt_solver *s);
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive.
 void bt_solver_solve(bt_world *w);
+
+/// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
+void bt_solver_make_shift(bt_world *w);
 
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.

@@ -190,7 +190,7 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
 {
     const double now = bt_clock(), waited = bt_domain_exchange_time(w);
     *phase += now - *t0 - waited;
-    w->stats.exchange_s += waited;
+    w->stats.phases.exchange += waited;
     *t0 = now;
 }
 
@@ -205,17 +205,18 @@ static void solve_contacts(bt_world *w)
     double t0 = bt_clock();
     double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     if (bt_cells_update(w, bt_margin_for(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
-    int64_t sweeps = 0, updates = 0, moves = 0;
+    int64_t sweeps = 0, updates = 0, moves = 0, checks = 0;
     bool again = false;
     st->repeats = 0;
     for (bool done = false; !done;) {
         bt_contacts_detect(w, again); // gaps and J at X1
-        clock_phase(w, &st->detect_s, &t0);
+        clock_phase(w, &st->phases.detect, &t0);
         bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
-        clock_phase(w, &st->solve_s, &t0);
+        clock_phase(w, &st->phases.solve, &t0);
         sweeps += st->sweeps;
         updates += st->unit_updates;
         moves += st->unit_moves;
+        checks += st->residual_checks;
         fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
         st->outrun = bt_contacts_outrun(w);
         done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
@@ -227,37 +228,37 @@ static void solve_contacts(bt_world *w)
                 bt_contacts_bound(w, b->vel, b->vel, true);
             }
         }
-        clock_phase(w, &st->detect_s, &t0);
-        st->colour_s += w->solver->prepare_s;
-        st->solve_s -= w->solver->prepare_s;
+        clock_phase(w, &st->phases.detect, &t0);
     }
+    st->phases.detect -= st->phases.colour; // which it holds
     st->sweeps = sweeps;
     st->unit_updates = updates;
     st->unit_moves = moves;
+    st->residual_checks = checks;
 }
 
 void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
-    st->forces_s = st->detect_s = st->colour_s = st->solve_s = st->advance_s = st->exchange_s = 0;
+    st->phases = (bt_phases){0};
     double t0 = bt_clock();
     bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);
     bt_cells_begin(w);
-    clock_phase(w, &st->detect_s, &t0);
+    clock_phase(w, &st->phases.detect, &t0);
     if (w->tow)
         memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_tow_lead(w);
     bt_forces_begin(w);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
-    clock_phase(w, &st->forces_s, &t0);
+    clock_phase(w, &st->phases.forces, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
     bt_laws_grow(w);
     bt_solver_project(w); // D
+    clock_phase(w, &st->phases.project, &t0);
     balance(w);
-    clock_phase(w, &st->solve_s, &t0);
     bt_forces_record(w); // of the towed body, at X1
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
@@ -267,5 +268,5 @@ void bt_world_step(bt_world *w)
 #ifdef BT_VALIDATE
     if (w->step % BT_VALIDATE_STEPS == 0) bt_domain_validate(w);
 #endif
-    clock_phase(w, &st->advance_s, &t0);
+    clock_phase(w, &st->phases.advance, &t0);
 }

@@ -22,6 +22,7 @@ POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
 
 import command  # noqa: E402
+import rafted  # noqa: E402
 import replay as replay_data  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
@@ -47,6 +48,13 @@ MOVING = changed(
         "mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000,
         "line": {"breaking_load": 1e6}
     })
+
+
+RAFTS = changed(TOW,
+                domain={"length": 15, "width": 8, "ends_closing": 0.15},
+                ice__concentration=0.75,
+                ice__rafting={"kappa": 5},
+                run__duration=15)
 
 
 def script(*arguments):
@@ -389,6 +397,27 @@ def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
         assert np.abs(at / js(chrome, "return bergtow.metre") - np.column_stack([east, -north]))[inside].max() < 0.01
         chrome.find_element("id", "replay-follow").click()
     assert complaints(chrome) == []
+
+
+def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
+    """As much area of them as pictures have, in their colour; none where no floe rafts."""
+    r = run(tmp_path, RAFTS)
+    ready(chrome, page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch))
+    with Run(r.dir) as read:
+        last = read.n_frames - 1
+        over = rafted.overlaps(read.polygon_array(last, None)[0])
+    seek(chrome, last)
+    chrome.find_element("id", "replay-fit").click()
+    assert len(over) > 3
+    assert js(chrome, "return bergtow.overlap()") == pytest.approx(sum(map(rafted.area, over)), rel=0.01)
+    middle = max(over, key=rafted.area).mean(axis=0)
+    shade = js(chrome, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth;
+        const [x, y] = bergtow.screen(0), p = bergtow.pose(0), m = bergtow.metre;
+        const at = [x + m * (arguments[0] - p[0]), y - m * (arguments[1] - p[1])];
+        return [...c.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data].slice(0, 3)""",
+               *map(float, middle))
+    assert np.abs(np.array(shade) - [int(style.RAFTED[k:k + 2], 16) for k in (1, 3, 5)]).max() < 9
+    assert "floes over each other" in text(chrome, "#replay-rafts")[0] and complaints(chrome) == []
 
 
 def test_leaves_out_frames_and_floes_and_says_so(chrome, tow, tmp_path, monkeypatch):

@@ -131,6 +131,20 @@ def test_the_answer_is_the_design_statement(tmp_path):
     assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
 
 
+def test_conditions_without_a_value_are_named_beside_the_largest():
+    """Also where one of them has borne more: then the largest value is not the largest load."""
+    def condition(label, largest, **value):
+        return {"label": label, "design": {"tow": value | {"largest": largest, "start_up": None}}}
+    known = condition("80 %", 8e5, value=9e5, interval_95=[8.5e5, 1e6])
+    def said(*more):
+        return report_ensemble.governing({"conditions": [known, *more]})
+    assert said().startswith("Largest of these: 80\u00a0%, 900 kN (")
+    assert said(condition("70 %", 7e5)).startswith("No value for 70\u00a0%. Largest of the others: 80\u00a0%, 900 kN")
+    assert said(condition("70 %", 7e5), condition("90 %", 9.5e5)).startswith(
+        "No value for 70\u00a0%, 90\u00a0%, but 950 kN in the simulation: the largest value of this study is not known. ")
+    assert said({"label": "95 %", "design": {"tow": None}}).startswith("No value for 95\u00a0%. Largest")
+
+
 @pytest.mark.parametrize("mode", ["speed", "line"])
 def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode):
     """In title, method and answer; the direction varied between conditions stands in degrees."""

@@ -132,7 +132,7 @@ static void every_doubt_is_reported(void **state)
     t.stall = (bt_stall){.windows = 3, .time = 12};
     json = summary_of(&c, 600, &t, FLOES, everything_wrong);
     static const char *const reported[] = {"stopped early: SIGTERM",
-                                       "200 of 600 steps met the sweep limit",
+                                       "200 of 600 steps met the limit of work",
                                        "120 of 600 steps the contacts added energy",
                                        "overlap by up to 0.1 m",
                                        "momentum is conserved only to 0.001",

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Is there a load that would keep these bodies apart? (private to the solver)
+//
+// A wall, or a body that is led at a given speed, gives way to nothing. Bodies between two of them can be pressed so
+// that no velocities of theirs part all contacts: the contact problem has no solution, and a sweep adds load after load
+// for as long as one lets it.
+//
+//         wall                        body that is led           λ: grows with every sweep
+//       ///|■■■■■■|■■■■■■■|■■■■■■|▶▶   w < 0 somewhere, always    Jᵀλ: hardly changes, the loads balance each other
+//
+// Proof for an island of movable bodies (contacts with a bound on their load left out, friction as well). Let λ ≥ 0 be
+// any normal impulses, here those that the sweeps have come to, and w = J U + b the velocities of the contact points.
+// For every U' that parts or keeps all contacts, J U' + b ≥ 0,
+//
+//     0 ≤ λ·(J U' + b) = λ·w + (Jᵀλ)·(U' − U),    so    max over bodies of |U' − U| ≥ A/P,
+//     A = −λ·w,   P = Σ over bodies of |force part of Jᵀλ| + |moment part|/r,
+//
+// with |U' − U| the larger of the change of speed and r times that of the spin, r the radius of the body. Where A/P is
+// far beyond any speed of the step, nothing can give way but in ways no ice takes. With P = 0 this is the lemma of
+// Farkas. Rigid floes that are held by friction alone are not found: they have a solution (Acary, Cadoux, Lemaréchal &
+// Malick 2011), however large.
+#ifndef BERGTOW_LOCKED_H
+#define BERGTOW_LOCKED_H
+
+#include "bergtow/world.h"
+
+/// Of the largest speed with which contacts would close without loads: U' that is faster is none that ice takes,
+/// assumed.
+#define BT_LOCKED_SPEEDS 10
+
+/// Collective. After a solution that has not converged: is there an island in which |U' − U| is beyond BT_LOCKED_SPEEDS?
+/// Uses the array of the position projection; impulses and velocities stay.
+bool bt_locked(bt_world *w);
+
+#endif

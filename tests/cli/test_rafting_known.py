@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Floes that raft in front of a towed body, in closed form, from the case file to the numbers of the result.
+
+A body as wide as its channel pushes a row of n square floes of side a against the end wall, slowly, without drag. Only
+floe on floe rafts, so the row gives way at its n - 1 contacts, the weakest at a time, and they take turns. Shortened by
+s they lie over each other by s/(n - 1) each, and
+
+    F = q0 a + μ (ρ_w − ρ_i) g h a s/(n − 1),   q0 = κ/2 ρ_i (1 − ρ_i/ρ_w) g h²
+
+with the area a s over other ice, (2/κ) q0 a s of potential energy, q0 a s of work of the edges.
+
+Red when the bound of one contact is taken twice, friction of the sheets is of all rows at once, body or wall raft, or
+a number of the summary is of another kind.
+"""
+import numpy as np
+import pytest
+
+from harness import run
+
+A, H, MU, KAPPA, V, DT = 2.0, 0.2, 0.3, 8, 0.01, 0.1
+RHO_W, RHO_I, G = 1000.0, 920.0, 9.81
+Q0 = 0.5 * KAPPA * RHO_I * (1 - RHO_I / RHO_W) * G * H**2
+SHEETS = MU * (RHO_W - RHO_I) * G * H * A  # N for a metre of overlap
+
+
+def pushed(tmp_path, n, s):
+    """n floes that touch, between the body and the end wall, shortened by s."""
+    body, slack = 1.0, 1e-3
+    length = 1 + body + n * A + slack
+    r = run(tmp_path, {
+        "run": {"dt": DT, "duration": s / V},
+        "domain": {"length": length, "width": A + slack, "wall_friction": 0},
+        "ice": {"concentration": 0, "friction": MU, "thickness": H, "density": RHO_I, "rafting": {"kappa": KAPPA},
+                "drag": {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}},
+        "floes": [{"shape": "rectangle", "length": A, "width": A, "x": 1 + body + (k + 0.5) * A, "y": 0,
+                   "thickness": H} for k in range(n)],
+        "body": {"shape": "rectangle", "length": body, "width": A, "x": 1 + 0.5 * body, "draft": 1, "friction": 0},
+        "tow": {"speed": V, "ramp": 0},
+        "water": {"density": RHO_W},
+        "output": {"window_start": 0},
+        "solver": {"tolerance": 1e-7, "max_sweeps": 20000},
+    })
+    assert r.summary["unconverged_steps"] == 0
+    return r, slack
+
+
+@pytest.mark.parametrize("n, s", [(2, 1.0), (3, 1.5), (5, 1.2)])
+def test_a_row_against_the_wall(tmp_path, n, s):
+    r, slack = pushed(tmp_path, n, s)
+    load, way = r.series("ice_resistance", "body_x")
+    way = way - 1.5
+    over = (way - slack) / (n - 1)
+    packed = over > 0.1
+    assert packed.sum() > 300
+    # floes differ by one step's way, and what is booked is of the start of the step
+    np.testing.assert_allclose(load[packed], Q0 * A + SHEETS * over[packed], rtol=0.01)
+    assert r.summary["rafting_pairs"] == n - 1
+    area = A * (way[-1] - slack)
+    assert r.summary["rafted_area_m2"] == pytest.approx(area, rel=0.005)
+    assert r.summary["rafted_energy_j"] == pytest.approx(2 / KAPPA * Q0 * area, rel=0.005)
+    assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area, rel=0.005)
+    assert r.summary["raft_friction_work_j"] == pytest.approx(0.5 * SHEETS * (n - 1) * over[-1]**2, rel=0.03)
+
