@@ -167,8 +167,9 @@ def governing(s):
             "without bound"
     value = worth(d["value"], *d["interval_95"])[0]
     said = without_value(s, d["value"])
-    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE)} "
-            f"tonne-force); upper end of its interval {both(d['interval_95'][1])}")
+    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, {value} "
+             f"({text_table.number(d['value'] / TONNE_FORCE)} tonne-force); upper end of its interval "
+             f"{both(d['interval_95'][1])}")
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
 

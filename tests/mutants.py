@@ -124,17 +124,30 @@ MUTANTS = {
     "src/solve/restitution.c": (["unit/test_restitution", "physics/test_impacts",
                                  "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
                                  "parallel/test_ranks.py"], [
-        ("any = b->restitution[ts->cell[k].contacts[i].b] > 0;", "any = 0;", "no rebound is ever lowered"),
-        ("if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;", "", "a wall makes one island of all"),
+        ("any = w->bodies.restitution[cell->contacts[j].b] > 0;", "any = 0;", "no rebound is ever lowered"),
         ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
         ("allowed * (normal + fabs(u->lt))", "0 * allowed * (normal + fabs(u->lt))", "rounding lowers rebounds"),
-        ("    bt_domain_maxima(w, &any, 1);\n    if (any == 0) return false;\n    for (bt_idx k = 0; k < ts->n; "
-         "k++)\n        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {\n            bt_contact *u",
-         "    if (any == 0) return false;\n    for (bt_idx k = 0; k < ts->n; k++)\n        for (bt_idx j = 0; j < "
-         "ts->cell[k].n_contacts; j++) {\n            bt_contact *u", "ranks disagree whether to solve again"),
-        ("s->root[root_of(s, u->b)] = root_of(s, u->a);", "", "every floe an island"),
+        ("        any = 1;\n    }\n    bt_domain_maxima(w, &any, 1);", "        any = 1;\n    }",
+         "ranks disagree whether to solve again"),
         ("if (normal == 0 || u->n == 0) continue;", "if (normal == 0) continue;", "sheets pay for rebounds"),
-        ("bt_pack_bias(w, &ts->cell[k].contacts[i], &ts->cell[k].gaps[i], 1);", ";", "a lowered rebound stays lowered"),
+        ("bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);", ";", "a lowered rebound stays lowered"),
+    ]),
+    "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py", "physics/test_impacts",
+                             "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
+                             "parallel/test_ranks.py"], [
+        ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
+        ("s->root[bt_islands_root(s, u->b)] = bt_islands_root(s, u->a);", "", "every floe an island"),
+        ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
+        ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
+    ]),
+    "src/solve/locked.c": (["cli/test_locked.py"], [
+        ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
+         "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
+        ("power -= u->ln[c]", "power += u->ln[c]", "parting counts as approach"),
+        (" + u->bias[c]);", ");", "a gap counts as closed"),
+        ("hypot(d->x, d->y) / b->inv[i].m + moment", "0", "what can give way is locked, too"),
+        ("BT_LOCKED_SPEEDS * t.most * bt_sum_value", "1e6 * t.most * bt_sum_value", "nothing is ever locked"),
+        ("bt_phases_run(w, push, NULL, w->solver->shift, &t);", "", "no load, no imbalance"),
     ]),
     "src/solve/project.c": (PROJECT, [
         ("t->most = bt_max(t->most, -g->after[i]);", "t->most = bt_max(t->most, -g->gap[i]);", "overlap of the start"),

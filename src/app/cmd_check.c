@@ -11,6 +11,7 @@
 #include "bergtow/shape.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_derived.h"
 #include "app/cmd.h"
 #include "app/cmd_check.h"
 #include "case/cost.h"
@@ -22,7 +23,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const double gravity = 9.81;
 
 typedef struct {
     bt_cmd_case file;
@@ -163,7 +163,7 @@ static void print_body(const bt_case *c)
     static const char *const modes[] = {
         [BT_TOW_NONE] = "none", [BT_TOW_SPEED] = "speed", [BT_TOW_LINE] = "line", [BT_TOW_THRUST] = "thrust"};
     printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", modes[c->tow.mode], speed,
-           bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
+           bt_case_tow_distance(c, c->run.duration), speed / sqrt(BT_GRAVITY * along));
     if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c);
 }
 
@@ -181,12 +181,12 @@ static void print_crushing(const bt_case *c, const bt_check_ice *n)
 static void print_rafting(const bt_case *c, const bt_check_ice *n)
 {
     if (!(c->ice.rafting_kappa > 0) || n->count < 1) return;
-    const double share = c->ice.density / c->water.density, h = n->thickness;
+    const double h = n->thickness,
+                 line = 0.5 * c->ice.rafting_kappa * bt_case_rise(c->ice.density, c->water.density) * h * h;
     printf("rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an "
            "edge of a mean floe's width rafts at %.4g N\n",
-           c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h, c->ice.rafting_kappa,
-           c->ice.friction * (c->water.density - c->ice.density) * gravity * h,
-           c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h * n->size);
+           line, c->ice.rafting_kappa, c->ice.friction * (c->water.density - c->ice.density) * BT_GRAVITY * h,
+           line * n->size);
 }
 
 static void print_window(const bt_case *c)

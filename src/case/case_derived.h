@@ -10,6 +10,15 @@
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                     const char **why);
 
+#define BT_GRAVITY 9.81 ///< m/s²
+
+/// What sheets on each other gain in potential energy, over the area and the square of their thickness, Pa/m
+/// (docs/theory.md, rafting).
+static inline double bt_case_rise(double ice_density, double water_density)
+{
+    return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
+}
+
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 

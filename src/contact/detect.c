@@ -113,16 +113,6 @@ typedef struct {
     bt_pack_scratch pack;
 } thread_scratch;
 
-static void go_idle(bt_cell *t)
-{
-    free(t->search.pairs);
-    t->search.pairs = NULL;
-    t->search.n_pairs = t->search.cap_pairs = t->n_contacts = 0;
-    t->n_points = 0;
-    t->search.listed = false;
-    t->overlap = 0;
-}
-
 /// Contacts that several parts of a floe have found are one.
 static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
 {
@@ -249,7 +239,7 @@ void bt_contacts_detect(bt_world *w, bool again)
         if (!cell->own) continue;
         const bool active = t->bound[k] > 0;
         if (!active) {
-            if (cell->search.pairs || cell->n_contacts) go_idle(cell);
+            if (cell->search.pairs || cell->n_contacts) bt_cells_idle(cell);
             cell->active = false;
             continue;
         }

@@ -28,6 +28,14 @@ static inline void bt_apply(const bt_contact *u, double jn, double ma, double mb
     vb->w += ib.i * (mb + jt * u->rbt);
 }
 
+/// Impulse of a contact on its body b; on a the opposite.
+static inline void bt_impulse_on_b(const bt_contact *u, double *x, double *y)
+{
+    const double normal = u->ln[0] + u->ln[1];
+    *x = normal * u->nx - u->lt * u->ny;
+    *y = normal * u->ny + u->lt * u->nx;
+}
+
 static inline double bt_clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
 
 /// Bodies of infinite mass are never written: they are shared by cells that are done at once.

@@ -7,10 +7,9 @@
 
 #include "base/elementary.h"
 #include "base/name.h"
+#include "case/case_derived.h"
 #include "force/environment.h"
 #include "bergtow/shape.h"
-
-#define GRAVITY 9.81 // m/s²
 
 double bt_estimate_strength(const bt_estimate_input *in)
 {
@@ -45,8 +44,8 @@ static bt_estimate compaction(const bt_estimate_input *in)
 static bt_estimate rafting(const bt_estimate_input *in)
 {
     const bool compact = in->concentration >= BT_EST_COMPACT;
-    const double lift = 0.5 * in->ice_density * (1 - in->ice_density / in->water_density) * GRAVITY * in->thickness *
-                        in->thickness * in->concentration * in->width;
+    const double lift = 0.5 * bt_case_rise(in->ice_density, in->water_density) * in->thickness * in->thickness *
+                        in->concentration * in->width;
     return (bt_estimate){.force = in->kappa * lift,
                          .low = in->kappa_low * lift,
                          .high = in->kappa_high * lift,
@@ -74,7 +73,7 @@ static bt_estimate dilute(const bt_estimate_input *in)
 /// Regression of the resistance of ships over the pack-ice Froude number.
 static double ships_of(const bt_estimate_input *in, double k, double b, double n)
 {
-    const double froude = in->along / sqrt(GRAVITY * in->thickness * in->concentration);
+    const double froude = in->along / sqrt(BT_GRAVITY * in->thickness * in->concentration);
     return 0.5 * k * bt_pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along *
            bt_pow(in->concentration, n);
 }
@@ -111,18 +110,19 @@ static bt_estimate_def estimates[BT_MAX_ESTIMATES] = {
     [BT_EST_COMPACTION] = {.name = "marchenko_compaction",
                            .label = "Marchenko, compaction",
                            .formula = "P W, P = P* h exp(-20 (1 - A))",
-                           .source = "our closure of Marchenko et al. 2010 with the strength of Hibler 1979",
+                           .source = "closure of this program after Marchenko et al. 2010, with the strength of "
+                                     "Hibler 1979",
                            .at = compaction},
     [BT_EST_RAFTING] = {.name = "marchenko_rafting",
                         .label = "Marchenko, rafting",
                         .formula = "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
-                        .source = "our closure of Marchenko et al. 2010; kappa assumed, 34 for pressure ridges (Flato "
-                                  "& Hibler 1995)",
+                        .source = "closure of this program after Marchenko et al. 2010; kappa assumed, 34 for pressure "
+                                  "ridges (Flato & Hibler 1995)",
                         .at = rafting},
     [BT_EST_MOMENTUM] = {.name = "marchenko_momentum",
                          .label = "Marchenko, momentum",
                          .formula = "rho_i h W V^2 A phi / (phi - A)",
-                         .source = "our closure of Marchenko et al. 2010: ice swept together to phi",
+                         .source = "closure of this program after Marchenko et al. 2010: ice swept together to phi",
                          .at = momentum},
     [BT_EST_DILUTE] = {.name = "dilute_limit",
                        .label = "dilute limit",

@@ -17,6 +17,7 @@
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
+#include "contact/row.h"
 #include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
@@ -24,14 +25,6 @@
 #include "space/phases.h"
 
 enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
-
-/// Impulse of a contact on its body b; on a the opposite.
-static inline void impulse_on_b(const bt_contact *u, double *x, double *y)
-{
-    const double normal = u->ln[0] + u->ln[1];
-    *x = normal * u->nx - u->lt * u->ny;
-    *y = normal * u->ny + u->lt * u->nx;
-}
 
 /// One cell's share of the sums over contacts and floes.
 static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
@@ -54,7 +47,7 @@ static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
         double jx, jy;
-        impulse_on_b(u, &jx, &jy);
+        bt_impulse_on_b(u, &jx, &jy);
         if (u->a == towed || u->b == towed) {
             const bool is_b = u->b == towed;
             const double sign = is_b ? 1 : -1;
@@ -309,7 +302,7 @@ void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, do
         for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++) {
             const bt_contact *u = &cell->contacts[j];
             double jx, jy;
-            impulse_on_b(u, &jx, &jy);
+            bt_impulse_on_b(u, &jx, &jy);
             const bt_idx side[] = {u->a, u->b};
             for (int s = 0; s < 2; s++) {
                 const bt_gid other = b->gid[side[s]] - n_free;

@@ -16,7 +16,6 @@
 #include "output/state.h"
 #include "base/elementary.h"
 
-#define GRAVITY 9.81     // m/s²
 #define WALL_SIZES 5.0   // a wall is at least as thick, in mean floe sizes (setup.c)
 #define UNIT 0x1p30      // J: sums hold numbers up to 2⁶² (sum.h)
 
@@ -39,7 +38,7 @@ static drivers drivers_of(const bt_case *c)
         .prescribed = prescribed,
         .water = circles ? 2 * water : water,
         .wind = air + water,
-        .slope = c->water.tilt == BT_TILT_SLOPE ? GRAVITY * bt_hypot(c->water.slope_x, c->water.slope_y) : 0,
+        .slope = c->water.tilt == BT_TILT_SLOPE ? BT_GRAVITY * bt_hypot(c->water.slope_x, c->water.slope_y) : 0,
         .dt = c->run.dt,
         .duration = c->run.duration,
     };

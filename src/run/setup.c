@@ -16,10 +16,10 @@
 #include "step/window.h"
 #include "contact/added.h"
 #include "case/case_check.h"
+#include "case/case_derived.h"
 #include "run/setup_tow.h"
 #include "base/elementary.h"
 
-#define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
 #define LARGE_RATIO                                                                                                    \
     8.0 // a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
@@ -33,8 +33,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
     double water[2], air[2]; // at time zero; where they change, each step sets its own
     bt_environment_at(c, true, 0, water);
     bt_environment_at(c, false, 0, air);
-    // of potential energy: contact/raft.h
-    const double rise = c->ice.density * (1 - c->ice.density / c->water.density) * GRAVITY;
+    const double rise = bt_case_rise(c->ice.density, c->water.density);
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -55,7 +54,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .crush_pressure = c->ice.crushing_pressure,
         .crush_least = c->ice.crushing_least,
         .raft_line = c->ice.rafting_kappa * 0.5 * rise,
-        .raft_sheet = (c->water.density - c->ice.density) * GRAVITY,
+        .raft_sheet = (c->water.density - c->ice.density) * BT_GRAVITY,
         .raft_rise = rise,
         .water_u = water[0],
         .water_v = water[1],
@@ -68,8 +67,8 @@ bt_params bt_setup_params(const bt_case *c, double size)
         p.balance_u = water[0];
         p.balance_v = water[1];
     } else if (c->water.tilt == BT_TILT_SLOPE) {
-        p.tilt_ax = -GRAVITY * c->water.slope_x;
-        p.tilt_ay = -GRAVITY * c->water.slope_y;
+        p.tilt_ax = -BT_GRAVITY * c->water.slope_x;
+        p.tilt_ay = -BT_GRAVITY * c->water.slope_y;
     }
     bt_added_setup(c, p.added_own);
     return p;

@@ -16,7 +16,8 @@ typedef struct bt_islands {
     bt_idx *root;  ///< [n bodies] union-find of the movable bodies that touch
     bt_gid *name;  ///< [n bodies] at the roots: gid of a body of the island, the same on all ranks
     double *share; ///< [n bodies] at the roots: a number of the island, 1 at first
-    bt_sum *sum;   ///< [n bodies] at the roots: sums over this rank's part of the island, and by bt_islands_add over all
+    /// [n bodies] at the roots: sums over this rank's part of the island, and by bt_islands_add over all of it
+    bt_sum *sum;
     bt_idx cap;
 } bt_islands;
 

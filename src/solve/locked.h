@@ -28,7 +28,8 @@
 /// assumed.
 #define BT_LOCKED_SPEEDS 10
 
-/// Collective. After a solution that has not converged: is there an island in which |U' − U| is beyond BT_LOCKED_SPEEDS?
+/// Collective. After a solution that has not converged: is there an island in which |U' − U| is beyond
+/// BT_LOCKED_SPEEDS?
 /// Uses the array of the position projection; impulses and velocities stay.
 bool bt_locked(bt_world *w);
 

@@ -15,18 +15,45 @@
 
 bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
-static void free_cell(bt_cell *t)
+static void free_work(bt_work_list *k)
+{
+    free(k->list);
+    free(k->before);
+    free(k->batch);
+    k->list = NULL;
+    k->before = NULL;
+    k->batch = NULL;
+    k->n_list = k->cap_list = k->n_batches = k->cap_batches = 0;
+}
+
+void bt_cells_idle(bt_cell *t)
 {
     free(t->search.pairs);
     free(t->search.near);
     free(t->contacts);
     free(t->gaps);
     free(t->laws.limits);
+    free_work(&t->work);
+    t->search = (bt_pair_search){0};
+    t->contacts = NULL;
+    t->gaps = NULL;
+    t->laws.limits = NULL;
+    t->n_contacts = t->cap_contacts = t->laws.cap_limits = 0;
+    t->n_points = 0;
+    t->overlap = 0;
+}
+
+static void free_cell(bt_cell *t)
+{
+    bt_cells_idle(t);
     free(t->laws.memory);
-    free(t->work.list);
-    free(t->work.before);
-    free(t->work.batch);
     *t = (bt_cell){0};
+}
+
+void bt_cells_trim(bt_cells *t)
+{
+    for (bt_idx k = 0; k < t->n; k++)
+        if (!t->cell[k].work.packed) free_work(&t->cell[k].work);
 }
 
 void bt_cells_free(bt_cells *t)

@@ -5,6 +5,7 @@
 
 #include "contact/work.h"
 #include "contact/contacts.h"
+#include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
 #include "bergtow/forces.h"
@@ -137,8 +138,10 @@ static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)
         bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
-        bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
-        bt_sum_add(&t->sum[APPLIED_Y], sign * (normal * u->ny + u->lt * u->nx));
+        double jx, jy;
+        bt_impulse_on_b(u, &jx, &jy);
+        bt_sum_add(&t->sum[APPLIED_X], sign * jx);
+        bt_sum_add(&t->sum[APPLIED_Y], sign * jy);
     }
     bt_sum_add(&t->sum[POINTS], (double)cell->n_points);
     t->most = bt_max(t->most, cell->overlap);

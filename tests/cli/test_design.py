@@ -123,10 +123,13 @@ def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
 
 
 @pytest.mark.parametrize("value, low, high, words", [
-    (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")), (123456.0, 20000.0, 1.5e6, ("100 kN", "0 to 1500 kN")),
-    (5.2e6, 4.13e6, np.inf, ("5.2 MN", "4.1 to no bound MN")), (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
+    (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")),
+    (123456.0, 20000.0, 1.5e6, ("120 kN", "20 to 1500 kN")),
+    (947e3, 924e3, 2200e3, ("950 kN", "920 to 2200 kN")),
+    (5.2e6, 4.13e6, np.inf, ("5.2 MN", "4.1 to no bound MN")),
+    (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
     (12.0, np.nan, np.nan, ("12.0 N", "–")), (0.0, 0.0, 0.0, ("0 N", "–")),
-    (17.0, 0.0, 3e6, ("20 N", "0 to 3000000 N"))
+    (17.0, 0.0, 3e6, ("17 N", "0 to 3000000 N"))
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
     assert report_ensemble.worth(value, low, high) == words

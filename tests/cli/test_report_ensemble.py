@@ -141,7 +141,8 @@ def test_conditions_without_a_value_are_named_beside_the_largest():
     assert said().startswith("Largest of these: 80\u00a0%, 900 kN (")
     assert said(condition("70 %", 7e5)).startswith("No value for 70\u00a0%. Largest of the others: 80\u00a0%, 900 kN")
     assert said(condition("70 %", 7e5), condition("90 %", 9.5e5)).startswith(
-        "No value for 70\u00a0%, 90\u00a0%, but 950 kN in the simulation: the largest value of this study is not known. ")
+        "No value for 70\u00a0%, 90\u00a0%, but 950 kN in the simulation: the largest value of this study is not "
+        "known. ")
     assert said({"label": "95 %", "design": {"tow": None}}).startswith("No value for 95\u00a0%. Largest")
 
 
