@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/elementary.h"
 #include "contact/law.h"
 #include "contact/row.h"
 #include "partition/domain.h"
@@ -82,7 +83,7 @@ static void imbalance(bt_world *w, bt_islands *s)
             const bt_vel *d = &w->solver->shift[i];
             if (b->inv[i].m == 0 || (d->x == 0 && d->y == 0 && d->w == 0)) continue;
             const double moment = b->inv[i].i > 0 ? fabs(d->w) / (b->inv[i].i * b->radius[i]) : 0;
-            bt_sum_add(&s->sum[bt_islands_root(s, i)], hypot(d->x, d->y) / b->inv[i].m + moment);
+            bt_sum_add(&s->sum[bt_islands_root(s, i)], bt_hypot(d->x, d->y) / b->inv[i].m + moment);
         }
     }
     bt_islands_add(w, s);
