@@ -144,9 +144,8 @@ MUTANTS = {
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
          "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
         ("power -= u->ln[c]", "power += u->ln[c]", "parting counts as approach"),
-        (" + u->bias[c]);", ");", "a gap counts as closed"),
         ("bt_hypot(d->x, d->y) / b->inv[i].m + moment", "0", "what can give way is locked, too"),
-        ("BT_LOCKED_SPEEDS * t.most * bt_sum_value", "1e6 * t.most * bt_sum_value", "nothing is ever locked"),
+        ("BT_LOCKED_SPEEDS * t.most * bt_sum_value", "1e30 * t.most * bt_sum_value", "nothing is ever locked"),
         ("bt_phases_run(w, push, NULL, w->solver->shift, &t);", "", "no load, no imbalance"),
     ]),
     "src/solve/project.c": (PROJECT, [

@@ -42,7 +42,8 @@ SCENES = {
         TOWED, floes=row(1, 12.0, y=0.55) + row(1, 12.0, y=-0.55),
         body={"shape": "polygon", "x": 9.9, "draft": 0.5, "friction": 0,
               "vertices": [[1.0, 0.0], [-0.6, 0.8], [-0.6, -0.8]]}), False),
-    "floes that raft": (changed(towards(4), ice__rafting={"kappa": 5}, tow__speed=0.02), False),
+    "floes that raft": (changed(towards(10), ice__rafting={"kappa": 5}, solver__max_sweeps=1, solver__tolerance=1e-12,
+                               run__duration=4), False),
     "heavy floes that have room": (changed(towards(6, 11.9), ice__thickness=3.0), False),
 }
 
@@ -58,7 +59,9 @@ def test_bodies_that_cannot_give_way(tmp_path, name):
     if locks:
         assert locked.sum() >= 5
         assert bool(warned(r, "more work would not help")) == (locked.sum() == unconverged.sum())
-    elif unconverged.any():
+    else:
+        assert name != "floes that raft" or unconverged.sum() > 5
+    if unconverged.sum() > locked.sum():
         assert warned(r, "raise solver.max_sweeps")
 
 
