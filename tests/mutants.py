@@ -132,7 +132,8 @@ MUTANTS = {
         ("if (normal == 0 || u->n == 0) continue;", "if (normal == 0) continue;", "sheets pay for rebounds"),
         ("bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);", ";", "a lowered rebound stays lowered"),
     ]),
-    "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py", "physics/test_impacts",
+    "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py::test_bodies_that_cannot_give_way",
+                             "physics/test_impacts",
                              "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
                              "parallel/test_ranks.py"], [
         ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
@@ -140,7 +141,7 @@ MUTANTS = {
         ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
         ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
     ]),
-    "src/solve/locked.c": (["cli/test_locked.py"], [
+    "src/solve/locked.c": (["cli/test_locked.py::test_bodies_that_cannot_give_way"], [
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
          "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
         ("power -= u->ln[c]", "power += u->ln[c]", "parting counts as approach"),
