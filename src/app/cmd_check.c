@@ -23,7 +23,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-
 typedef struct {
     bt_cmd_case file;
     double scale; ///< length ratio of the twin to print, 0 = none

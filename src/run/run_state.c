@@ -5,9 +5,6 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 
 #include "bergtow/checkpoint.h"
 #include "partition/domain.h"
@@ -71,22 +68,12 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
     return bt_comm_agree(r->comm, status);
 }
 
-/// What has been freed to the system, where the library does not by itself.
-static void give_memory_back(void)
-{
-#ifdef __GLIBC__
-    malloc_trim(0);
-#endif
-}
-
 bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
 {
     // The result first: it may hold more than the checkpoint counts on, never less.
     bt_status status = bt_record_publish(r->record, err);
     if (status != BT_OK) return status;
     bt_snapshot s = {0};
-    bt_cells_trim(r->w->cells); // the state is held a second time until it is written
-    give_memory_back();
     status = bt_running_save(r, &s, err);
     if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, name, err);
     if (status == BT_OK && r->comm->rank == 0 && r->until < 0) bt_folder_settle(r->o->dir);

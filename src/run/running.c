@@ -262,6 +262,7 @@ static void step_at_pace(bt_world *w, bt_pace *p)
     if (p->now != omp_get_max_threads()) start_threads(p->now);
     const double wall = bt_clock(), cpu = processor_time();
     bt_world_step(w);
+    // not in the step itself: fields are shaken by steps that are not meant to converge
     w->stats.locked = !w->stats.converged && bt_locked(w);
     bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
 }

@@ -95,7 +95,7 @@ static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
 static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_batch kind)
 {
     if (cell->work.n_batches == cell->work.cap_batches) {
-        const bt_idx cap = bt_max(LANES, cell->work.cap_batches + cell->work.cap_batches / 4);
+        const bt_idx cap = bt_max(LANES, 2 * cell->work.cap_batches);
         bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
         if (cell->work.n_batches > 0) memcpy(more, cell->work.batch, (size_t)cell->work.n_batches * sizeof *more);
         free(cell->work.batch);

@@ -50,12 +50,6 @@ static void free_cell(bt_cell *t)
     *t = (bt_cell){0};
 }
 
-void bt_cells_trim(bt_cells *t)
-{
-    for (bt_idx k = 0; k < t->n; k++)
-        if (!t->cell[k].work.packed) free_work(&t->cell[k].work);
-}
-
 void bt_cells_free(bt_cells *t)
 {
     if (!t) return;

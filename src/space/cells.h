@@ -228,10 +228,6 @@ void bt_cells_leave(bt_cells *t);
 /// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
 void bt_cells_idle(bt_cell *t);
 
-/// Between two steps: take from all cells what only the sweeps of a step need, up to half of the memory in dense
-/// contact.
-void bt_cells_trim(bt_cells *t);
-
 /// How far the centroid of body i stands outside its cell, m.
 double bt_cells_outside(const bt_world *w, bt_idx i);
 

@@ -60,4 +60,3 @@ def test_a_row_against_the_wall(tmp_path, n, s):
     assert r.summary["rafted_energy_j"] == pytest.approx(2 / KAPPA * Q0 * area, rel=0.005)
     assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area, rel=0.005)
     assert r.summary["raft_friction_work_j"] == pytest.approx(0.5 * SHEETS * (n - 1) * over[-1]**2, rel=0.03)
-

@@ -400,7 +400,7 @@ def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
 
 
 def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
-    """As much area of them as pictures have, in their colour; none where no floe rafts."""
+    """As much area of them as pictures have, in their colour."""
     r = run(tmp_path, RAFTS)
     ready(chrome, page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch))
     with Run(r.dir) as read:
@@ -418,6 +418,10 @@ def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
                *map(float, middle))
     assert np.abs(np.array(shade) - [int(style.RAFTED[k:k + 2], 16) for k in (1, 3, 5)]).max() < 9
     assert "floes over each other" in text(chrome, "#replay-rafts")[0] and complaints(chrome) == []
+
+
+def test_rigid_floes_have_no_such_legend(page):
+    assert not page.find_element("id", "replay-rafts").is_displayed()
 
 
 def test_leaves_out_frames_and_floes_and_says_so(chrome, tow, tmp_path, monkeypatch):
