@@ -192,7 +192,7 @@ static const row rows[] = {
     {"history/raft_edge_work", "J", "work taken by edges that raft so far", "one"},
     {"history/raft_friction_work", "J", "work taken by friction between sheets so far", "one"},
     {"history/unconverged", "1", "steps that did not converge", "one"},
-    {"history/locked", "1", "of them, steps in which some bodies could not give way", "one"},
+    {"history/locked_steps", "1", "of them, steps in which some bodies could not give way", "one"},
     {"history/unprojected", "1", "steps whose overlap was not removed", "one"},
     {"history/positive_work", "1", "steps in which contacts added energy", "one"},
     {"history/restitution_cut", "1", "steps in which rebounds were lowered", "one"},

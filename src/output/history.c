@@ -51,18 +51,18 @@ static double added_energy(const bt_sample *s) { return s->contact_work > WORK_R
         .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
         .offset = offsetof(bt_sample, from)                                                                            \
     }
-#define LATER(type, member, rule_, from)                                                                               \
+#define LATER(type, member, rule_, from, missing_)                                                                     \
     {                                                                                                                  \
         .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
-        .offset = offsetof(bt_sample, from), .later = true                                                             \
+        .offset = offsetof(bt_sample, from), .missing = BT_TOTAL_##missing_                                            \
     }
 const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
     TOTAL(F64, sum_updates, SUM, unit_updates),
     TOTAL(F64, sum_moves, SUM, momentum_moves),
-    LATER(F64, sum_checks, SUM, residual_checks),
-    LATER(F64, sum_projected, SUM, position_updates),
+    LATER(F64, sum_checks, SUM, residual_checks, UNKNOWN),
+    LATER(F64, sum_projected, SUM, position_updates, UNKNOWN),
     TOTAL(F64, contact_work, SUM, contact_work),
     TOTAL(F64, max_overlap, MAX, overlap),
     TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
@@ -71,15 +71,15 @@ const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, max_crushed_depth, MAX, crushed_depth),
     TOTAL(F64, max_crushing, MAX, crushing),
     TOTAL(I64, crushing_steps, STEPS, crushing),
-    LATER(F64, rafting, LAST, rafting),
-    LATER(F64, rafted_area, LAST, rafted_area),
-    LATER(F64, rafted_energy, LAST, rafted_energy),
-    LATER(F64, max_rafted_area, MAX, rafted_area),
-    LATER(F64, rafted_largest, MAX, rafted_largest),
-    LATER(F64, raft_edge_work, SUM, raft_edge_work),
-    LATER(F64, raft_friction_work, SUM, raft_friction_work),
+    LATER(F64, rafting, LAST, rafting, ZERO),
+    LATER(F64, rafted_area, LAST, rafted_area, ZERO),
+    LATER(F64, rafted_energy, LAST, rafted_energy, ZERO),
+    LATER(F64, max_rafted_area, MAX, rafted_area, ZERO),
+    LATER(F64, rafted_largest, MAX, rafted_largest, ZERO),
+    LATER(F64, raft_edge_work, SUM, raft_edge_work, ZERO),
+    LATER(F64, raft_friction_work, SUM, raft_friction_work, ZERO),
     TOTAL(I64, unconverged, STEPS, unconverged),
-    LATER(I64, locked, STEPS, locked),
+    LATER(F64, locked_steps, STEPS, locked, UNKNOWN),
     TOTAL(I64, unprojected, STEPS, unprojected),
     {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)},
      .rule = BT_TOTAL_STEPS,
@@ -97,9 +97,10 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
     char *at = (char *)h + t->at.offset;
     if (t->of) x = t->of(s);
     else memcpy(&x, (const char *)s + t->offset, sizeof x);
+    if (t->rule == BT_TOTAL_STEPS) x = x != 0;
     if (t->at.type == BT_ITEM_I64) {
         memcpy(&whole, at, sizeof whole);
-        whole += t->rule == BT_TOTAL_STEPS ? x != 0 : (int64_t)x;
+        whole += (int64_t)x;
         memcpy(at, &whole, sizeof whole);
     } else {
         memcpy(&sum, at, sizeof sum);

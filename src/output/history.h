@@ -39,7 +39,8 @@ typedef struct bt_history {
     int64_t crushing_steps;
     double rafting, rafted_area, rafted_energy;  ///< in the last step, as in bt_sample
     double max_rafted_area, rafted_largest, raft_edge_work, raft_friction_work; ///< m², m², J, J
-    int64_t unconverged, locked, unprojected, positive_work, restitution_cut, repeats, outrun;
+    double locked_steps;
+    int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
 enum { BT_N_TOTALS = 28, BT_HISTORY_NAME = 80 };
@@ -49,7 +50,8 @@ typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
     /// STEPS: those in which the number is not 0; LAST: what it was in the last step
     enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } rule;
-    bool later;                           ///< not in checkpoints of before there were such numbers: then 0
+    /// Of a run from a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
+    enum { BT_TOTAL_THERE, BT_TOTAL_ZERO, BT_TOTAL_UNKNOWN } missing;
     size_t offset;                        ///< of the number in bt_sample
     double (*of)(const bt_sample *s);     ///< or a function of it
 } bt_total;

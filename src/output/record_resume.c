@@ -108,7 +108,10 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
         const bt_total *t = &bt_history_totals[k];
         char name[BT_HISTORY_NAME];
         snprintf(name, sizeof name, "history/%s", t->at.name);
-        if (!t->later || bt_snapshot_find(s, name)) bt_snapshot_take_rows(s, "history", &t->at, 1, h);
+        const double unknown = NAN;
+        if (t->missing == BT_TOTAL_THERE || bt_snapshot_find(s, name))
+            bt_snapshot_take_rows(s, "history", &t->at, 1, h);
+        else if (t->missing == BT_TOTAL_UNKNOWN) memcpy((char *)h + t->at.offset, &unknown, sizeof unknown);
     }
     check_added(s);
     h->n = h->cap = n;
@@ -125,15 +128,23 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     if (s->faulty) h->n = 0;
 }
 
-/// Entries 0 up to n of all series. before: of a program whose floes did not raft; series that it had not are 0, as are
-/// those of forces that the run had not.
-static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
+/// In a result without this series: a force that the run had not and floes that did not raft were 0 all the time;
+/// another number of the program's own was not taken.
+static double missing_value(int k)
+{
+    const bt_quantity *q = bt_series(k);
+    return was_zero(q) || !strncmp(q->name, "raft", 4) ? 0 : NAN;
+}
+
+/// Entries 0 up to n of all series.
+static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
-        const bool maybe = before || (k >= bt_n_own_series && was_zero(bt_series(k)));
-        if (maybe && !bt_h5_there(old, name)) memset(x, 0, (size_t)n * sizeof *x);
+        const bool maybe = k < bt_n_own_series || was_zero(bt_series(k));
+        if (maybe && !bt_h5_there(old, name))
+            for (int64_t i = 0; i < n; i++) x[i] = missing_value(k);
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
@@ -253,7 +264,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
-        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries, !bt_snapshot_find(s, "history/rafting"));
+        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);
         bt_record_events(r, e, err);
     }
     bt_status status = bt_comm_agree(r->comm, s->faulty                      ? BT_ERR_CASE

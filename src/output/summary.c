@@ -11,6 +11,7 @@
 #include "case/case_check.h"
 #include "estimate/packing.h"
 #include "output/summary_window.h"
+#include "solve/locked.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -142,15 +143,14 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
                       "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
                       "tolerance %.2g m/s); %s",
                       (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance,
-                      h->locked < h->unconverged ? "raise solver.max_sweeps or lower run.dt"
-                                                 : "more work would not help");
-    if (h->locked)
+                      h->locked_steps >= (double)h->unconverged ? "more work would not help"
+                                                                : "raise solver.max_sweeps or lower run.dt");
+    if (h->locked_steps > 0)
         bt_errors_add(&s->warnings,
-                      "in %lld of %lld steps bodies were locked between others that give way to nothing (walls, a body "
+                      "in %.0f of %lld steps bodies were locked between others that give way to nothing (walls, a body "
                       "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
-                      "let ice give way (ice.rafting.kappa, ice.crushing.pressure), tow by a line or a vessel "
-                      "(tow.mode), or move the walls away",
-                      (long long)h->locked, (long long)h->n);
+                      BT_LOCKED_REMEDY,
+                      h->locked_steps, (long long)h->n);
     if (h->outrun)
         bt_errors_add(
             &s->warnings,

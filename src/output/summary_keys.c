@@ -338,7 +338,7 @@ const bt_json_key bt_summary_keys[] = {
     OF_HISTORY("max_overlap_m", max_overlap, "m", "deepest overlap of two bodies"),
     NUMBER("max_overlap_relative", overlap_relative, "1", "the same over the mean floe size"),
     OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the limit of work before the tolerance"),
-    OF_HISTORY("locked_steps", locked, "1",
+    OF_HISTORY("locked_steps", locked_steps, "1",
         "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
     OF_HISTORY("max_residual_m_s", max_residual, "m/s", "largest residual of the contact problem at the end of a step"),
     OF_TOTALS("tolerance_m_s", tolerance, "m/s", "residual at which the sweeps stop"),

@@ -11,6 +11,7 @@
 #include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
+#include "solve/locked.h"
 #include "space/cells.h"
 #include "partition/domain.h"
 #include "output/state.h"
@@ -257,8 +258,7 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
             "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
             "%s",
             w->step, g->in_a_row,
-            s->locked != 0 ? "in the last, bodies are locked between others that give way to nothing: let ice give way "
-                             "(ice.rafting.kappa, ice.crushing.pressure), or tow by a line or a vessel (tow.mode)"
+            s->locked != 0 ? "in the last, bodies are locked between others that give way to nothing: " BT_LOCKED_REMEDY
                            : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
                              "where ice jams");
     }

@@ -27,6 +27,10 @@
 /// Of the largest speed with which contacts would close without loads: U' that is faster is none that ice takes,
 /// assumed.
 #define BT_LOCKED_SPEEDS 10
+/// What helps, in the words of a message.
+#define BT_LOCKED_REMEDY                                                                                               \
+    "let ice give way (ice.rafting.kappa, ice.crushing.pressure), tow by a line or a vessel (tow.mode), or move the "  \
+    "walls away"
 
 /// Collective. After a solution that has not converged: is there an island in which |U' − U| is beyond
 /// BT_LOCKED_SPEEDS?

@@ -244,6 +244,7 @@ void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
     st->phases = (bt_phases){0};
+    bt_domain_exchange_time(w); // waited since the last step, for its record: not in the time of this one
     double t0 = bt_clock();
     bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);

@@ -18,6 +18,8 @@ CRUSHING = {
     "tow": {"speed": 0.3, "ramp": 0.5},
 }
 NEW = ("rafting", "rafted_area", "rafted_largest", "rafted_energy", "raft_edge_work", "raft_friction_work")
+UNCOUNTED = {"locked": "locked_steps", "residual_checks": "mean_residual_checks",
+             "position_updates": "mean_position_updates"}
 
 
 def as_it_was(folder, damage=None):
@@ -52,6 +54,26 @@ def test_it_goes_on_to_the_same_bits(tmp_path):
     assert result.returncode == DONE, result.stderr
     assert Run(tmp_path / "cut", result).hash == whole.hash
     assert differing(whole.dir / "result.h5", tmp_path / "cut/result.h5") == []
+
+
+def test_what_was_not_counted_is_not_known(tmp_path):
+    """Red when steps of before the numbers were taken count as 0: a mean over all steps would be too small."""
+    run(tmp_path, CRUSHING, "--steps", 70, name="cut")
+    with h5py.File(tmp_path / "cut/checkpoint.h5", "r+") as f, h5py.File(tmp_path / "cut/result.h5", "r+") as old:
+        for total in ("sum_checks", "sum_projected", "locked_steps"):
+            del f["history"][total]
+        for name in UNCOUNTED:
+            del old["series"][name]
+    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
+    seal(tmp_path / "cut/result.h5", "result 1")
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == DONE, result.stderr
+    summary = Run(tmp_path / "cut", result).summary
+    assert all(summary[number] is None for number in UNCOUNTED.values()), summary
+    with h5py.File(tmp_path / "cut/result.h5") as f:
+        for name in UNCOUNTED:
+            x = f["series"][name][:]
+            assert np.all(np.isnan(x[:70])) and np.all(np.isfinite(x[70:])), name
 
 
 def test_numbers_where_only_dimensions_are_written(tmp_path):
