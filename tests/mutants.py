@@ -455,12 +455,15 @@ MUTANTS = {
         ("if (r->present && !(x <= most)) most = x;", "if (r->present) most = x;",
          "the last branch, not the strongest"),
     ]),
-    "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting"], [
+    "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting",
+                             "cli/test_older_checkpoint.py::test_what_was_not_counted_is_not_known"], [
         ("TOTAL(F64, max_overlap, MAX, overlap)", "TOTAL(F64, max_overlap, LAST, overlap)", "largest overlap"),
         ("TOTAL(F64, contact_work, SUM, contact_work)", "TOTAL(F64, contact_work, LAST, contact_work)",
          "work of a step"),
         ("TOTAL(I64, repeats, SUM, repeats)", "TOTAL(I64, repeats, STEPS, repeats)", "repeats"),
-        ("LATER(F64, rafting, LAST, rafting)", "LATER(F64, rafting, SUM, rafting)", "pairs at the end"),
+        ("LATER(F64, rafting, LAST, rafting, ZERO)", "LATER(F64, rafting, SUM, rafting, ZERO)", "pairs at the end"),
+        ("LATER(F64, locked_steps, STEPS, locked, UNKNOWN)", "LATER(F64, locked_steps, STEPS, locked, ZERO)",
+         "steps of before a number was taken"),
         ("s->contact_work > WORK_ROUNDING * s->kinetic_energy", "s->contact_work > s->kinetic_energy",
          "energy from contacts"),
     ]),

@@ -50,7 +50,7 @@ typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
     /// STEPS: those in which the number is not 0; LAST: what it was in the last step
     enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } rule;
-    /// Of a run from a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
+    /// In a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
     enum { BT_TOTAL_THERE, BT_TOTAL_ZERO, BT_TOTAL_UNKNOWN } missing;
     size_t offset;                        ///< of the number in bt_sample
     double (*of)(const bt_sample *s);     ///< or a function of it
