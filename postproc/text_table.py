@@ -9,14 +9,18 @@ def hours_text(hours):
     return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
 
 
+PROSE = 40  # characters: a column with a longer cell holds words, not numbers
+
+
 def table(head, rows, markdown):
-    """Columns of a head and rows of texts; the first is left-aligned, the others right."""
+    """Columns of a head and rows of texts: the first and those that hold words are left-aligned, the others right."""
+    width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
+    left = [k == 0 or max((len(row[k]) for row in rows), default=0) > PROSE for k in range(len(head))]
     if markdown:
         return "\n".join("| " + " | ".join(cells) + " |"
-                         for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows))
-    width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
+                         for cells in (head, ["---" if words else "---:" for words in left], *rows))
     def line(cells):
-        return "  ".join([cells[0].ljust(width[0])] + [c.rjust(w) for c, w in zip(cells[1:], width[1:])]).rstrip()
+        return "  ".join(c.ljust(w) if words else c.rjust(w) for c, w, words in zip(cells, width, left)).rstrip()
     return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
 
 
