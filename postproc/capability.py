@@ -8,7 +8,8 @@ which half of the tows no longer make it.
 A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) in the mean over the
 window and no branch of its line parts. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
 line that may part; a prescribed speed is kept whatever it takes. The search is that of bracket.py; what it has tried is
-a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
+a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where periodic
+sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
 """
 import argparse
 import sys
@@ -18,9 +19,11 @@ from pathlib import Path
 
 import command  # first: it has words for packages that are missing
 import bracket
+import domain_width
 import findings
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case
+from case_file import files, section
 from case_runs import SPENT, CaseRuns, above_zero, checked, program
 
 import numpy as np
@@ -75,6 +78,7 @@ class Condition:
     search: bracket.Bracket
     trials: dict = field(default_factory=dict)   #: [Trial] by value
     failed: dict = field(default_factory=dict)   #: [why] by value
+    wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None where that of the case will do
     why: str = ""     #: the search ended before it was through
 
 
@@ -86,9 +90,19 @@ class Search:
     key: str
     least: float      #: m/s
     say: object       #: where the progress goes, None for nowhere
+    widen: bool = True
 
     def folder(self, c, value):
         return f"{c.name}/{value:.8g}"
+
+    def sets(self, c, value):
+        """What is replaced in the case for a value, {key: value}."""
+        sets = c.sets | {self.key: value}
+        if value not in c.wider:
+            r = self.runs
+            texts = [*r.given, *(f"{k}={v}" for k, v in sets.items())]
+            c.wider[value] = domain_width.needed(r.program, r.case, texts) if self.widen else None
+        return sets | ({"domain.width": c.wider[value]} if c.wider[value] else {})
 
     def add(self, c, value, n):
         """n more trials; False where the budget is spent. A run that fails is no trial: another field stands for it."""
@@ -100,7 +114,7 @@ class Search:
         if time.monotonic() + self.runs.seconds.get(name, 0.0) > self.runs.end:
             return False
         numbers = range(first, first + n)
-        why = self.runs.make(name, numbers, c.sets | {self.key: value})
+        why = self.runs.make(name, numbers, self.sets(c, value))
         for i, w in zip(numbers, why):
             if w == SPENT:
                 return False
@@ -148,7 +162,7 @@ def row_of(c, value, least):
     some = c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
-           "body_widths": some[0].widths, "body_widths_needed": some[0].needed}
+           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value)}
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
         out[name] = x.tolist()
@@ -246,6 +260,7 @@ def arguments(argv):
     p.add_argument("--points", type=int, choices=range(0, 101), default=POINTS, metavar="N",
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
+    domain_width.add_option(p)
     findings.add_options(p, BUDGET)
     a = p.parse_args(argv)
     for name, k in (("start", 0), ("end", 1)):
@@ -272,7 +287,10 @@ def main(argv=None):
     least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
     last = began + 60 * a.budget
     runs = CaseRuns(a.case, folder, "capability", binary, a.set, a.jobs, last, last)
-    search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None)
+    replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
+    layers = files(a.case)
+    keep = a.keep_width or domain_width.stays({name: section(layers, name) for name in ("domain", "ice")}, replaced)
+    search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None, not keep)
     some = conditions(a, binary, a.set, start, end, resolution)
     for k, c in enumerate(some):
         runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)

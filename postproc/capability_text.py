@@ -77,8 +77,19 @@ def narrow(found):
             "and tows stop too early there; make domain.width larger.")
 
 
+def wider(found):
+    """Where the domain was made wider for its ice, a sentence; "" where it was not."""
+    made = [(p["value"], p["wider"]) for c in found["conditions"] for p in c["points"] if p.get("wider")]
+    if not made:
+        return ""
+    values, widths = (sorted({x[k] for x in made}, key=lambda v: float(str(v).split()[0])) for k in (0, 1))
+    at, to = ([f(x[0])] + [f(x[-1])] * (len(x) > 1) for x, f in ((values, lambda v: value(found, v)), (widths, str)))
+    return (f"At {' to '.join(at)} the domain was made {' to '.join(to)} wide: narrower, its periodic images would "
+            "carry part of the resistance (--keep-width leaves it).")
+
+
 def text(found, markdown=False):
-    return "\n\n".join(part for part in (limits(found, markdown), narrow(found), meaning(found),
+    return "\n\n".join(part for part in (limits(found, markdown), narrow(found), wider(found), meaning(found),
                                          curve(found, markdown)) if part)
 
 

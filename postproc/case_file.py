@@ -48,3 +48,8 @@ def section(layers, name):
         keys = found.get(name)
         out |= keys if isinstance(keys, dict) else {}
     return out
+
+
+def says(case, section, key):
+    """What a case, {section: its keys}, says of a key; None where it says nothing."""
+    return case.get(section, {}).get(key)

@@ -14,8 +14,6 @@ width that the rule asks for: a load that rests on the periodic images of the bo
 of the question, and are left where they are.
 """
 import argparse
-import json
-import math
 import os
 import re
 import subprocess
@@ -26,12 +24,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import command
+import domain_width
 import findings
 import pdf
 import report
 from bergtow_read import Run, RunError
-from case_file import contents, files, is_study, section
-from case_runs import STOPPED, above_zero, checked, program
+from case_file import contents, files, is_study, says, section
+from case_runs import STOPPED, above_zero, program
+from domain_width import reads_ice
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
 from report_case import TITLE_BLOCK
@@ -47,8 +47,6 @@ MARGIN = 0.95                # of what is left is given to fields
 FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
-#: where the case says one of these, the place of the ice is given, and the domain is not made wider
-PLACED = "domain.y0", "ice.y_min", "ice.y_max"
 FEW = 5                      # fields below which nothing is known of the scatter between them
 
 
@@ -90,16 +88,6 @@ class Work:
         return done.returncode == 0
 
 
-def reads_ice(case):
-    """Is the ice of a case read, so that it has no concentration to vary?"""
-    return any(str(says(case, "ice", k) or "none") != "none" for k in ("outlines", "field"))
-
-
-def says(case, section, key):
-    """What a case says of a key, None where it says nothing."""
-    return case.get(section, {}).get(key)
-
-
 def title_of(case, name, values):
     title = says(case, "run", "title")
     if values:  # that of the case alone is not that of the study
@@ -109,25 +97,13 @@ def title_of(case, name, values):
     return ": ".join(part for part in (str(title or name), words) if part)
 
 
-def wide_enough(domain):
-    """The width, m, of three digits, that the ice in a domain needs; None where it is there, or cannot be had."""
-    there, needed = domain["body_widths"], domain["body_widths_needed"]
-    if domain["sides"] != "periodic images" or not there or not needed or needed <= there:
-        return None
-    width = domain["width_m"] * needed / there
-    digit = 10.0 ** (math.floor(math.log10(width)) - 2)
-    return round(math.ceil(width / digit) * digit, 6)
-
-
 def widths(work, a, case):
     """{concentration: domain.width as text} for those that need a wider domain than the case has. Errors: RunError."""
-    replaced = {text.split("=")[0].strip() for text in a.set}
-    placed = [key for key in PLACED if says(case, *key.split(".")) is not None]
-    if a.keep_width or reads_ice(case) or placed or replaced & {"domain.width", *PLACED}:
+    if a.keep_width or domain_width.stays(case, [text.split("=")[0].strip() for text in a.set]):
         return {}
-    found = {c: wide_enough(json.loads(checked(work.program, a.file, [*a.set, f"ice.concentration={c!r}"], "--json"))
-                            ["domain"]) for c in a.concentrations}
-    return {c: f"{width:g} m" for c, width in found.items() if width}
+    found = {c: domain_width.needed(work.program, a.file, [*a.set, f"ice.concentration={c!r}"])
+             for c in a.concentrations}
+    return {c: width for c, width in found.items() if width}
 
 
 def write_study(a, case, repeats, wider):
@@ -272,8 +248,7 @@ def arguments(argv):
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
     p.add_argument("--concentrations", type=concentrations, metavar="A,...", default=concentrations(CONCENTRATIONS),
                    help=f"of a case (default: {CONCENTRATIONS})")
-    p.add_argument("--keep-width", action="store_true", help="of a case: leave its domain.width as it is, although "
-                   "dense ice needs a wider one")
+    domain_width.add_option(p)
     p.add_argument("--fields", type=whole, default=MOST_FIELDS, metavar="N",
                    help="of a case: at most so many of each condition (default: %(default)s)")
     p.add_argument("--seed", type=whole, default=1, metavar="N", help="of a case: of its fields (default: 1)")

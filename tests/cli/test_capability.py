@@ -148,6 +148,19 @@ def test_the_limit_of_concentration_against_brute_force(tmp_path):
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/capability/**/summary.json")}
 
 
+@pytest.mark.parametrize("more", [(), ("--keep-width",)])
+def test_dense_ice_gets_the_width_that_it_needs(tmp_path, more):
+    """Red when a tow stops in dense ice because its periodic images are near."""
+    case = changed(THRUST, domain__sides="periodic", run__duration=10, output__window_start=5)
+    found, text = found_in(tmp_path, case, "--from", 0.3, "--to", 0.5, "--points", 0, "--budget", 3, "--fields", 6,
+                           "--resolution", 0.2, *more)
+    loose, dense = found["conditions"][0]["points"]
+    assert loose["body_widths"] == pytest.approx(6, rel=0.01) and loose["wider"] is None
+    assert dense["body_widths"] == pytest.approx(6 if more else 10, rel=0.01)
+    assert ("At 50.0 % the domain was made 10.1 m wide" in text) == (not more)
+    assert ("WARNING: at 50.0 % the domain is narrow" in text) == bool(more)
+
+
 OPEN_WATER = changed(THRUST, ice__concentration=0.01, domain__length=30, run__duration=60, output__window_start=45,
                      tow__ramp=1, tow__speed=0.4)
 

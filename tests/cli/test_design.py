@@ -16,6 +16,7 @@ from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import design  # noqa: E402
+import domain_width  # noqa: E402
 import pdf  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
@@ -85,7 +86,7 @@ def test_the_study_that_it_makes(made):
     ({"sides": "periodic images", "width_m": 10, "body_widths": 4.996, "body_widths_needed": 30}, 60.1)
 ])
 def test_the_width_that_the_ice_needs(domain, width):
-    assert design.wide_enough(domain) == width
+    assert domain_width.wide_enough(domain) == width
 
 
 PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration=10, output__window_start=2)
