@@ -39,6 +39,7 @@ class Load:
     label: str
     units: str
     description: str
+    applies: str = ""     #: what a run must have for it, in the words of the registry
     conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
 
 
@@ -52,7 +53,7 @@ def _floe_force(run):
     conversion = str(run.impacts["conversion"])
     return Load("floe_force", "force of one floe", run.units("largest_push"),
                 "largest force of one floe on the towed body: as the mean over a step, or the peak of a "
-                "collision", conversion), np.maximum(push, peak)
+                "collision", conversion=conversion), np.maximum(push, peak)
 
 
 def _panel_load(run):
@@ -68,7 +69,8 @@ def of_run(run):
     out = []
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
-            out.append((Load(name, run.label(name), run.units(name), run.description(name)), run[name]))
+            out.append((Load(name, run.label(name), run.units(name), run.description(name),
+                             run.attribute(name, "applies")), run[name]))
     return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
 
 
@@ -137,7 +139,8 @@ def statistics(e, rows, options):
             start_up = start_up | {"inertia": _inertia(e, first["member"], start_up["time_s"], first["scale"])}
         found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
-            "label": load.label, "units": load.units, "description": load.description, "conversion": load.conversion,
+            "label": load.label, "units": load.units, "description": load.description, "applies": load.applies,
+            "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
             "fields": len(fields), "hours": total, "gap_s": gap, **stat_load.summary(fields),

@@ -28,7 +28,7 @@ DOUBTFUL = {
     "unsteady": "members whose loads still change within the window",
     "short": "members with fewer than 20 independent samples", "stopped": "members that stopped early"
 }
-TENSIONS = ("line_tension_1", "line_tension_2")
+LINE = "with a tow line"  #: what the tension of a branch applies to, alone or with more words
 #: what stands in the line of what the values hold for: case key, words in front and behind
 HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
              ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
@@ -196,8 +196,8 @@ def statement(e, rows, c):
     "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
     case, loads = case_of(e, rows), c["loads"]
     tow = loads.get("tow_force")
-    tensions = [(loads[name]["design"], loads[name]) for name in TENSIONS
-                if name in loads and "value" in loads[name]["design"]]
+    tensions = [(load["design"], load) for load in loads.values()
+                if load["applies"].startswith(LINE) and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if tow is None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the run-level tests share: writing a case, running it, reading what it leaves, and plain polygon geometry."""
 import copy
+import functools
 import json
 import os
 import pathlib
@@ -47,6 +48,15 @@ CLOSING = {
     "solver": {"max_sweeps": 2, "position_sweeps": 0},
     "guard": {"overlap": 0},
 }
+
+
+@functools.cache
+def machine_keys():
+    """Keys of summary.json, the outer ones, that are of the machine and the moment and not of the result: wall times,
+    what they make, and what the division among ranks has cost."""
+    listed = json.loads(subprocess.run([BERGTOW, "--list-quantities", "--json"], capture_output=True, text=True,
+                                       check=True).stdout)
+    return frozenset(k["name"].split(".")[0] for k in listed["summary"] if k["machine"])
 
 
 def changed(base, /, **changes):

@@ -342,7 +342,7 @@ def result_of(folder, case, name):
 
 
 def square(p, q):
-    """Do two convex polygons have edges that face each other within 11.5 degrees (bt_contacts_pair: 0.98)?"""
+    """Do two convex polygons have edges that face each other within 11.5 degrees (bt_contacts_parts: 0.98)?"""
     normals = []
     for v in (p, q):
         e = np.roll(v, -1, axis=0) - v

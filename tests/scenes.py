@@ -26,7 +26,7 @@ import tempfile
 import h5py
 import numpy as np
 
-from harness import BERGTOW, CLOSING, PRESS, ROOT, TOW, changed, environment, launcher, write_case
+from harness import BERGTOW, CLOSING, PRESS, ROOT, TOW, changed, environment, launcher, machine_keys, write_case
 
 STORED = ROOT / "tests/parallel/scenes.json"
 
@@ -36,12 +36,10 @@ LAYOUTS = [((1, 1),), ((1, 2),), ((2, 1),), ((1, 1), (1, 2)), ((3, 1),), ((2, 2)
 #: seconds that a leg may take, mpirun on a busy machine included
 PATIENCE = 180
 
-#: keys of the summary and attributes of result.h5 that depend on machine, clock or layout: they must be there
-VOLATILE = {"version", "ranks", "threads", "sweep_bytes_per_contact",
-            "wall_time_s", "phases_s", "ns_per_floe_step", "memory_per_floe_b",
-            "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
-            "edge_cut", "halo_share", "command_line", "compiler", "flags", "host", "libraries", "revision",
-            "start_time", "wall_time"}
+#: attributes of result.h5 that depend on program, machine, clock or layout: they must be there, as machine_keys of the
+#: summary
+PROVENANCE = {"version", "ranks", "threads", "command_line", "compiler", "flags", "host", "libraries", "revision",
+              "start_time", "wall_time"}
 
 SHORT = changed(TOW, run__duration=4)
 DENSE = changed(TOW, run__duration=4, ice__concentration=0.75, ice__size=0.9)
@@ -275,7 +273,7 @@ def items_of(folder):
         for key, value in holder.attrs.items():
             if key != "description":
                 plain = value.item() if isinstance(value, np.generic) else value  # NumPy 2 has another repr of its own
-                items[f"{at}@{key}"] = "there" if key in VOLATILE else repr(plain)
+                items[f"{at}@{key}"] = "there" if key in PROVENANCE else repr(plain)
 
     def take(name, item):
         if isinstance(item, h5py.Group):
@@ -289,7 +287,7 @@ def items_of(folder):
         attributes("/", f)
         f.visititems(take)
     for key, value in json.loads((folder / "summary.json").read_text()).items():
-        items.update(leaves("summary." + key, "there" if key in VOLATILE else value))
+        items.update(leaves("summary." + key, "there" if key in machine_keys() | PROVENANCE else value))
     return items
 
 

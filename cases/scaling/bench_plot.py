@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The picture of a benchmark: `bench_plot.py bench.csv [bench.png]` draws it again from the table."""
 import csv
+import itertools
 import sys
 from pathlib import Path
 
@@ -11,7 +12,6 @@ from style import FAINT, INK, plt  # noqa: E402
 
 # Okabe & Ito
 COLOURS = {"tow-80": "#56b4e9", "tow-95": "#0072b2", "compression-80": "#e69f00", "compression-95": "#d55e00"}
-PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output", "project"]
 PHASE_COLOURS = ["#009e73", "#f0e442", "#56b4e9", "#d55e00", "#0072b2", "#cc79a7", "#999999", "#e69f00"]
 
 
@@ -84,7 +84,8 @@ def phase_bars(ax, rows):
     largest = max(r["asked"] for r in rows)
     chosen = [r for r in rows if r["asked"] == largest]
     left = [0.0] * len(chosen)
-    for phase, colour in zip(PHASES, PHASE_COLOURS):
+    phases = [name.removesuffix("_share") for name in rows[0] if name.endswith("_share") and name != "halo_share"]
+    for phase, colour in zip(phases, itertools.cycle(PHASE_COLOURS)):
         share = [100 * (r.get(phase + "_share") or 0) for r in chosen]
         ax.barh(range(len(chosen)), share, left=left, color=colour, label=phase, height=0.75)
         left = [a + b for a, b in zip(left, share)]

@@ -29,7 +29,7 @@
 //                       poses, and cannot be made from them
 //                     D cell array, at, n_in_cells, labelled
 //                     - moved, moved_any, speed, bound, awake, busy, order, share, still
-//                     not needed: asleep (a cell that rests is found to do so again), n_listings
+//                     not needed: asleep (a cell that rests is found to do so again)
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
 //                     (contacts.h)

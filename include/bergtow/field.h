@@ -90,12 +90,10 @@ void bt_field_share(const bt_comm *c, bt_field *f);
 /// Errors: BT_ERR_IO.
 bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 
-/// Read such a file. Every value is checked (finite, convex, sizes, offsets), and errors name file and floe; f has been
-/// initialised, what it held is released, and it is empty after an error. Errors: BT_ERR_IO from the system,
-/// BT_ERR_CASE for what the file holds.
-bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err);
-/// The same, with outlines that are not convex as `nonconvex` says, and counted.
-bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err);
+/// Read such a file, with outlines that are not convex as `nonconvex` says, and counted. Every value is checked
+/// (finite, convex, sizes, offsets), and errors name file and floe; f has been initialised, what it held is released,
+/// and it is empty after an error. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err);
 
 #ifdef __cplusplus
 }

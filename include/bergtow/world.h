@@ -279,9 +279,6 @@ typedef struct bt_overlaps {
 /// and storage may be renewed: indices of bodies change then.
 bt_overlaps bt_world_overlaps(bt_world *w, double allowed);
 
-/// Collective. Deepest overlap over all pairs at the present poses, m (0 = none). Indices of bodies may change.
-double bt_world_overlap(bt_world *w);
-
 /// Collective. 64-bit hash of the state: poses and velocities by gid, memory of contact laws, step, window, drift of
 /// the water, tow. Equal for equal states, however stored or distributed.
 uint64_t bt_world_hash(const bt_world *w);

@@ -40,7 +40,7 @@ static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)
 /// Of the field that was read, or expected of the one that will be made.
 static bt_check_ice ice_of(const bt_case *c, const bt_field *f)
 {
-    bt_check_ice n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    bt_check_ice n = bt_case_reads_field(c) ? ice_of_field(c, f) : ice_of_case(c);
     n.corners = bt_cost_corners(c, f, n.count);
     return n;
 }
@@ -63,8 +63,6 @@ double bt_check_seconds(const bt_case *c, const bt_check_ice *n)
 
 // --- refusals and warnings -------------------------------------------------------------------------------------------
 
-static bool reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
-
 /// Bodies, walls and floes that are known, as the run sets them up.
 static bt_status try_setup(const bt_case *c, const bt_field *f, bt_errors *err)
 {
@@ -81,11 +79,11 @@ bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_
 {
     const double machine = bt_cost_machine();
     bt_status status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, machine, err);
-    if (status == BT_OK && reads_field(c)) status = bt_field_load(c, f, err);
-    if (status == BT_OK && reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
+    if (status == BT_OK && bt_case_reads_field(c)) status = bt_field_load(c, f, err);
+    if (status == BT_OK && bt_case_reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
     if (status != BT_OK) return status;
     *n = *run = ice_of(c, f);
-    if (reads_field(c) && c->lead.mode != BT_LEAD_NONE) {
+    if (bt_case_reads_field(c) && c->lead.mode != BT_LEAD_NONE) {
         status = bt_lead_open(c, f, lead, err);
         if (status == BT_OK) *run = ice_of(c, f);
     }

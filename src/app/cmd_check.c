@@ -72,15 +72,11 @@ static const struct argp check_argp = {.options = check_options,
                                            "Validate a case and print the numbers that follow from it; or a study, "
                                            "with the case of each of its conditions. Nothing is computed or written."};
 
-static bool reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
-
-static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
-
 static void print_ice(const bt_case *c, const bt_check_ice *n)
 {
     printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
-    const bool read = c->ice.field || c->ice.outlines;
+    const bool read = bt_case_reads_field(c);
     printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count,
            c->ice.field ? " (read from the field file)"
            : read       ? " (read from the outlines)"
@@ -206,7 +202,7 @@ static void print_lead(const bt_case *c, const bt_lead_stats *lead)
            c->lead.width * c->lead.length);
     if (c->lead.mode == BT_LEAD_MANAGED) printf(", pieces of at most %.4g m", c->lead.floe_size);
     printf("\n");
-    if (reads_field(c)) bt_lead_stats_print(lead);
+    if (bt_case_reads_field(c)) bt_lead_stats_print(lead);
 }
 
 static void print_environment(const bt_case *c)
@@ -244,10 +240,10 @@ static void print_step(const bt_case *c, const bt_check_ice *n)
     printf("reference speed      %.4g m/s, contact law solved to %.3g m/s\n", speed, speed * c->solver.tolerance);
     const bt_check_step s = bt_check_step_of(c, n);
     printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, s.longest,
-           c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(s.contact));
+           c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", bt_check_verdict(s.contact));
     if (n->count < 1) return;
     printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed,
-           s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, verdict(s.floes));
+           s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, bt_check_verdict(s.floes));
 }
 
 static const char *bytes(double b, char out[32])

@@ -206,8 +206,6 @@ static void print_varied(const bt_study *s)
     }
 }
 
-static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
-
 /// Texts of a row of the table, the head for condition −1.
 static int row_of(const bt_study *s, const numbers *x, int64_t condition, char cell[][CELL])
 {
@@ -220,7 +218,7 @@ static int row_of(const bt_study *s, const numbers *x, int64_t condition, char c
         snprintf(cell[n++], CELL, "%.0f", x[condition].floes);
         snprintf(cell[n++], CELL, "%.0f", x[condition].steps);
         duration(x[condition].seconds, cell[n++]);
-        snprintf(cell[n++], CELL, "%s", verdict(x[condition].step_good));
+        snprintf(cell[n++], CELL, "%s", bt_check_verdict(x[condition].step_good));
         bt_member_free(&m);
         return n;
     }

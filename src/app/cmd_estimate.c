@@ -2,6 +2,7 @@
 // bergtow estimate: the published estimates of the resistance for a case, without simulating it.
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "case/case_derived.h"
 #include "app/cmd.h"
 #include "output/estimate_text.h"
 
@@ -61,7 +62,7 @@ int bt_cmd_estimate(int argc, char **argv)
     bt_errors err = {0};
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
+    if (status == BT_OK && bt_case_reads_field(&c)) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK && c.tow.mode == BT_TOW_NONE) {
         bt_errors_add(&err, "%s: %s, and the estimates are of the force on a towed body; %s", o.file.path,
                       c.body.shape == BT_BODY_ABSENT ? "body.shape: none" : "tow.mode: none",

@@ -85,7 +85,7 @@ int bt_cmd_field(int argc, char **argv)
         status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     if (status == BT_OK)
         printf("%s: %d floes, concentration %.4f of %.6g m2, %s in %.2f s\n", o.output, f.n, f.concentration,
-               f.ice_area, c.ice.outlines || c.ice.field ? "read" : "made", bt_clock() - start);
+               f.ice_area, bt_case_reads_field(&c) ? "read" : "made", bt_clock() - start);
     bt_errors warnings = {0};
     if (status == BT_OK) bt_outline_warn(&f.outlines, &c, &warnings);
     for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);

@@ -20,11 +20,6 @@
 
 typedef bt_check check;
 
-static void fill(double *member, double value)
-{
-    if (isnan(*member)) *member = value;
-}
-
 typedef struct {
     double x_min, x_max, y_min, y_max;
 } box;
@@ -77,8 +72,8 @@ static void follow_file(const check *k, const char *key, char **file)
 static void follow_start(bool drifts, double *vx, double *vy)
 {
     if (drifts && isnan(*vx) && isnan(*vy)) return;
-    fill(vx, 0);
-    fill(vy, 0);
+    bt_check_fill(vx, 0);
+    bt_check_fill(vy, 0);
 }
 
 static void follow(const check *k)
@@ -86,24 +81,24 @@ static void follow(const check *k)
     bt_case *c = k->c;
     bool basin = c->domain.frame == BT_FRAME_BASIN;
     if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
-    fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
-    fill(&c->domain.y0, -c->domain.width / 2);
-    fill(&c->ice.x_min, c->domain.x0);
-    fill(&c->ice.x_max, c->domain.x0 + c->domain.length);
-    fill(&c->ice.y_min, c->domain.y0);
-    fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
-    fill(&c->body.width, c->body.length);
-    fill(&c->body.x, basin ? c->domain.x0 + 2 * c->body.length : 0);
-    fill(&c->domain.ahead, bt_case_window_ahead(c));
-    fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
-    fill(&c->body.friction, c->ice.friction);
-    fill(&c->body.restitution, c->ice.restitution);
+    bt_check_fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
+    bt_check_fill(&c->domain.y0, -c->domain.width / 2);
+    bt_check_fill(&c->ice.x_min, c->domain.x0);
+    bt_check_fill(&c->ice.x_max, c->domain.x0 + c->domain.length);
+    bt_check_fill(&c->ice.y_min, c->domain.y0);
+    bt_check_fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
+    bt_check_fill(&c->body.width, c->body.length);
+    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * c->body.length : 0);
+    bt_check_fill(&c->domain.ahead, bt_case_window_ahead(c));
+    bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
+    bt_check_fill(&c->body.friction, c->ice.friction);
+    bt_check_fill(&c->body.restitution, c->ice.restitution);
     const bool drift = c->ice.start == BT_START_DRIFT;
     follow_start(drift && c->tow.mode == BT_TOW_NONE && c->body.shape != BT_BODY_ABSENT, &c->body.vx, &c->body.vy);
     for (bt_idx i = 0; i < c->n_floes; i++) {
         bt_floe_def *f = &c->floes[i];
-        fill(&f->width, f->length);
-        fill(&f->thickness, c->ice.thickness);
+        bt_check_fill(&f->width, f->length);
+        bt_check_fill(&f->thickness, c->ice.thickness);
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
@@ -204,7 +199,7 @@ static void check_sizes(const check *k)
         bt_check_fault(k, "ice.density",
                        "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them",
                        c->ice.density, c->water.density);
-    if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
+    if (bt_case_reads_field(c) || c->ice.concentration == 0) return;
     if (bt_check_sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
         bt_check_fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water",
                        c->ice.concentration, BT_LEAST_CONCENTRATION);
@@ -251,7 +246,7 @@ static void check_geographic(const check *k)
 {
     const bt_case *c = k->c;
     if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
-    const bool read = c->ice.field || c->ice.outlines,
+    const bool read = bt_case_reads_field(c),
                made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0),
                body = c->body.shape != BT_BODY_ABSENT;
     bool by_hand = false; // floes of the list without a thickness of their own
@@ -429,8 +424,8 @@ static void check_path(const check *k, int n, const double *v)
 // After check_tow: the reference speed goes by it.
 static void follow_impact(bt_case *c)
 {
-    fill(&c->impact.duration, c->run.dt);
-    fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
+    bt_check_fill(&c->impact.duration, c->run.dt);
+    bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
 }
 
 static void check_water(const check *k)

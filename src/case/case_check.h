@@ -3,6 +3,8 @@
 #ifndef BERGTOW_CASE_CHECK_H
 #define BERGTOW_CASE_CHECK_H
 
+#include <math.h>
+
 #include "bergtow/case.h"
 #include "case/case_derived.h"
 #include "case/case_faults.h"
@@ -11,6 +13,12 @@
 /// tables that the case
 /// names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
 bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
+
+/// The default of a number that is not given.
+static inline void bt_check_fill(double *member, double value)
+{
+    if (isnan(*member)) *member = value;
+}
 
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.
 bt_status bt_case_load_tables(bt_case *c, bt_errors *err);

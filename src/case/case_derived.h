@@ -19,6 +19,9 @@ static inline double bt_case_rise(double ice_density, double water_density)
     return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
 }
 
+/// Is the ice read from a file, not made?
+static inline bool bt_case_reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
+
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 

@@ -13,11 +13,6 @@
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
-static void fill(double *member, double value)
-{
-    if (isnan(*member)) *member = value;
-}
-
 // ---- speed and way ----
 
 /// Largest speed of the programme and the time at which it is first reached.
@@ -106,7 +101,7 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
 void bt_case_tow_course(const bt_check *k)
 {
     bt_case *c = k->c;
-    if (c->domain.frame == BT_FRAME_GEOGRAPHIC) fill(&c->body.x, 0);
+    if (c->domain.frame == BT_FRAME_GEOGRAPHIC) bt_check_fill(&c->body.x, 0);
     if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction") && !isnan(c->body.x))
         c->tow.direction = bt_atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
 }
@@ -122,14 +117,14 @@ void bt_case_tow_follow(const bt_check *k)
     }
     bt_case_tow_course(k);
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-    fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
-    fill(&c->tow.line.breaking_load, rope.breaking);
-    fill(&c->tow.branch2.length, c->tow.line_length);
-    fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
-    fill(&c->tow.branch2.damping, c->tow.line_damping);
-    fill(&c->tow.branch2.breaking_load, c->tow.line.breaking_load);
-    fill(&c->tow.vessel.free_resistance, 0.4 * c->tow.vessel.bollard_pull);
-    fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
+    bt_check_fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
+    bt_check_fill(&c->tow.line.breaking_load, rope.breaking);
+    bt_check_fill(&c->tow.branch2.length, c->tow.line_length);
+    bt_check_fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
+    bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
+    bt_check_fill(&c->tow.branch2.breaking_load, c->tow.line.breaking_load);
+    bt_check_fill(&c->tow.vessel.free_resistance, 0.4 * c->tow.vessel.bollard_pull);
+    bt_check_fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
 }
 
 // A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r
@@ -195,10 +190,10 @@ void bt_case_tow_hull(bt_case *c, int n, const double *v)
     double p[2], q[2];
     farthest_point(n, v, two ? -uy : ux, two ? ux : uy, p);
     farthest_point(n, v, uy, -ux, q);
-    fill(&c->tow.hull_x, p[0]);
-    fill(&c->tow.hull_y, p[1]);
-    fill(&c->tow.branch2.hull_x, q[0]);
-    fill(&c->tow.branch2.hull_y, q[1]);
+    bt_check_fill(&c->tow.hull_x, p[0]);
+    bt_check_fill(&c->tow.hull_y, p[1]);
+    bt_check_fill(&c->tow.branch2.hull_x, q[0]);
+    bt_check_fill(&c->tow.branch2.hull_y, q[1]);
 }
 
 // ---- checks ----

@@ -48,14 +48,10 @@ void bt_contacts_detect(bt_world *w, bool again);
 /// of crushing that have come apart do not, so the state must have been saved.
 double bt_contacts_overlap(bt_world *w);
 
-/// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of
-/// b, −1: none) settles ties between nearly equal reference edges. gap_out: the largest separation over the edge
-/// normals of both (a lower bound of the distance), axis_out its edge (numbered as in bt_pair).
-bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
-                      double *gap_out, int32_t *axis_out);
-
-/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair;
-/// otherwise see src/contact/manifold.c.
+/// Manifold of one convex part of each body (bt_pair.part) at the present poses; false when the gap exceeds margin.
+/// reference_before (0: edge of a, 1: of b, −1: none) settles ties between nearly equal reference edges. gap_out: the
+/// largest separation over the edge normals of both (a lower bound of the distance), axis_out its edge (numbered as in
+/// bt_pair).
 bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
 

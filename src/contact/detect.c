@@ -339,10 +339,3 @@ bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
     }
     return all;
 }
-
-double bt_world_overlap(bt_world *w)
-{
-    double deepest = bt_world_overlaps(w, 0).deepest;
-    bt_domain_maxima(w, &deepest, 1);
-    return deepest;
-}

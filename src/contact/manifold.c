@@ -276,8 +276,9 @@ static bool find_axes(const polygon *a, const polygon *b, double margin, double 
     return !(s->sb > margin);
 }
 
-bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
-                      double *gap_out, int32_t *axis_out)
+/// Of bodies that are convex.
+static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
+                         double *gap_out, int32_t *axis_out)
 {
     double d[2];
     bt_bodies_offset(w, a, b, d);
@@ -428,8 +429,7 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
 bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out)
 {
-    if (part[0] == 0 && part[1] == 0)
-        return bt_contacts_pair(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
+    if (part[0] == 0 && part[1] == 0) return bodies_touch(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
     bt_bodies_offset(w, ia, ib, d);
     const part_of_body a = part_of(&w->bodies, ia, part[0], 0, 0), b = part_of(&w->bodies, ib, part[1], d[0], d[1]);

@@ -254,12 +254,7 @@ static void take_hulls(bt_field *f)
     *f = g;
 }
 
-bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
-{
-    return bt_field_read_as(f, path, BT_NONCONVEX_REFUSE, err);
-}
-
-bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
+bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     bool bare;
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);

@@ -13,7 +13,7 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 {
     if (c->ice.outlines) return bt_field_read_outlines(c, f, err);
     if (!c->ice.field) return bt_field_generate(c, f, err);
-    const bt_status status = bt_field_read_as(f, c->ice.field, c->ice.nonconvex, err);
+    const bt_status status = bt_field_read(f, c->ice.field, c->ice.nonconvex, err);
     if (status != BT_OK) return status;
     bt_refusals r = {.path = c->ice.field, .err = err, .status = BT_OK};
     char why[BT_ICE_WHY];

@@ -421,20 +421,13 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     return status;
 }
 
-static bool all_finite(const double *x, int64_t n)
-{
-    for (int64_t k = 0; k < n; k++)
-        if (!isfinite(x[k])) return false;
-    return true;
-}
-
 /// The first row with a NaN or an infinity.
 static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base,
                                    char name[64])
 {
     for (int k = 0; base && k < n_rows; k++) {
         if (row[k].type != BT_ITEM_F64 ||
-            all_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width))
+            bt_state_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width))
             continue;
         snprintf(name, 64, "%s/%s", group, row[k].name);
         return name;
@@ -447,7 +440,7 @@ static bool open_finite(const bt_impact_open *o)
 {
     const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,
                            o->so_far.mass, o->so_far.thickness, o->rest,     o->largest};
-    return all_finite(real, N_OF(real));
+    return bt_state_finite(real, N_OF(real));
 }
 
 const char *bt_state_not_finite(const bt_world *w, char name[64])
@@ -458,10 +451,10 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
     const bt_impacts *m = w->impacts;
     if (found || !m) return found;
-    if (!all_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
+    if (!bt_state_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
     for (int64_t k = 0; k < m->n_open; k++)
         if (!open_finite(&m->open[k])) return "impacts/open";
-    return all_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL
+    return bt_state_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL
                                                                                                 : "impacts/panels";
 }
 

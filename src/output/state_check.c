@@ -25,13 +25,6 @@
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
 static const int32_t FAR = 1000000000; // cells, periods: as labels of cells are limited (cells.c)
 
-static bool all_finite(const double *x, int64_t n)
-{
-    for (int64_t k = 0; k < n; k++)
-        if (!isfinite(x[k])) return false;
-    return true;
-}
-
 static bool counts(int64_t n) { return n >= 0 && (double)n <= MOST; }
 
 // --- the field -------------------------------------------------------------------------------------------------------
@@ -73,7 +66,7 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     char why[BT_ICE_WHY];
     for (bt_idx i = 0; i < f->n && !s->faulty; i++) {
         const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
-        bt_snapshot_want(s, all_finite(f->vertices + 2 * first, 2 * n) && is_floe(f, i), "field/offsets", i,
+        bt_snapshot_want(s, bt_state_finite(f->vertices + 2 * first, 2 * n) && is_floe(f, i), "field/offsets", i,
                          "begins an outline that is no floe");
         if (s->faulty) return;
         const double *p = f->pose + 3 * (size_t)i;
@@ -202,7 +195,7 @@ static void check_contacts(const bt_world *w, const bt_memory *memory, int64_t n
         bt_snapshot_want(s, has_part(b, i, t->part[0]) && has_part(b, j, t->part[1]), "contacts/part", k,
                          "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
-        bt_snapshot_want(s, all_finite(t->value, 4), "contacts/value", k, "is not finite");
+        bt_snapshot_want(s, bt_state_finite(t->value, 4), "contacts/value", k, "is not finite");
         bt_snapshot_want(s, t->law < BT_LAWS + bt_n_contact_laws(), "contacts/law", k, "is no contact law");
         if (s->faulty) return;
         const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_law_applies(w, t->law, i, j));
@@ -219,7 +212,7 @@ static void check_tow(const bt_world *w, bt_snapshot *s)
     bt_snapshot_want(s, t->time == (double)w->step * t->dt, "tow/time", -1, "is not that of the step");
     const double place[] = {t->carriage_x, t->carriage_y, t->travel_x,  t->travel_y,  t->way,
                             t->ux,         t->uy,         t->vessel.vx, t->vessel.vy, t->vessel.way};
-    bt_snapshot_want(s, all_finite(place, sizeof place / sizeof *place), "tow/carriage_x", -1,
+    bt_snapshot_want(s, bt_state_finite(place, sizeof place / sizeof *place), "tow/carriage_x", -1,
                      "and what else moves with the tow are not all finite");
     bt_snapshot_want(s, t->mark >= 0 && t->mark <= t->path.n_marks, "tow/mark", -1,
                      "is no number of way-points passed");
@@ -232,7 +225,9 @@ static void check_window(const bt_world *w, bt_snapshot *s)
     const bt_window *v = w->window;
     const double real[] = {v->start, v->rear, v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
     bt_snapshot_want(
-        s, all_finite(real, sizeof real / sizeof *real) && all_finite(v->dropped, 3) && all_finite(v->brought, 3),
+        s,
+        bt_state_finite(real, sizeof real / sizeof *real) && bt_state_finite(v->dropped, 3) &&
+            bt_state_finite(v->brought, 3),
         "window/rear", -1, "and what else belongs to it are not all finite");
     bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
     bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
@@ -254,7 +249,7 @@ static void check_impacts(const bt_world *w, bt_snapshot *s)
                          "is no collision, or out of order");
         const double real[] = {
             e->time, e->x, e->y, e->impulse, e->approach, e->mass, e->thickness, m->open[k].rest, m->open[k].largest};
-        bt_snapshot_want(s, all_finite(real, sizeof real / sizeof *real) && e->impulse >= 0, "impacts/open", k,
+        bt_snapshot_want(s, bt_state_finite(real, sizeof real / sizeof *real) && e->impulse >= 0, "impacts/open", k,
                          "is not finite");
     }
 }
@@ -280,7 +275,7 @@ void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool 
     bt_snapshot_want(s, w->step >= 0, "world/step", -1, "is negative");
     bt_snapshot_want(s, isfinite(w->drift_x) && isfinite(w->drift_y), "world/drift_x", -1,
                      "and drift_y are not finite");
-    bt_snapshot_want(s, all_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1,
+    bt_snapshot_want(s, bt_state_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1,
                      "and what else is of water and air are not all finite");
     check_cells(w, s);
     if (!s->faulty) check_bodies(w, s);

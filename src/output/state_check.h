@@ -3,9 +3,19 @@
 #ifndef BT_STATE_CHECK_H
 #define BT_STATE_CHECK_H
 
+#include <math.h>
+
 #include "bergtow/field.h"
 #include "space/cells.h"
 #include "base/snapshot.h"
+
+/// Are all n numbers neither NaN nor infinite?
+static inline bool bt_state_finite(const double *x, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++)
+        if (!isfinite(x[k])) return false;
+    return true;
+}
 
 /// Complains into s of the first thing that is wrong with a field, whose arrays have the lengths that the first two
 /// give.

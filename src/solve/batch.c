@@ -142,12 +142,6 @@ static void pack(bt_cell *cell, const bt_inv *inv, const double *slop)
     }
 }
 
-void bt_batch_order(const bt_cell *cell, bt_idx *contact)
-{
-    for (bt_idx k = 0; k < cell->work.n_batches; k++)
-        for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
-}
-
 void bt_batch_unpack(bt_cell *cell)
 {
     if (!cell->work.packed) return;

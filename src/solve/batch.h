@@ -43,9 +43,6 @@ double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_swee
 double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
                         double *most);
 
-/// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
-void bt_batch_order(const bt_cell *cell, bt_idx *contact);
-
 /// Impulses back into the contacts, or multipliers into the gaps; nothing when they are there.
 void bt_batch_unpack(bt_cell *cell);
 

@@ -204,7 +204,7 @@ typedef struct bt_cells {
     bt_idx n_contacts;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its cell: renew before the next step
     bool still;                     ///< the water is at rest
-    int64_t n_labellings, n_listings;
+    int64_t n_labellings;
 } bt_cells;
 
 bt_cells *bt_cells_create(void);

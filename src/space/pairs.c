@@ -284,6 +284,4 @@ void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_s
     t->search.near_known = false;
     t->search.large_listed = large_moved;
     memcpy(t->search.moved_listed, moved, sizeof moved);
-#pragma omp atomic
-    ts->n_listings++;
 }

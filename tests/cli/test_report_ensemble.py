@@ -152,12 +152,13 @@ def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode)
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS | {"resamples": 1})
     monkeypatch.setitem(made_up.UNITS, "tow.direction", "rad")
     rng, line = np.random.default_rng(8), {"units": "N", "description": "first branch", "label": "line tension",
-                                           "role": "load", "order": 3}
+                                           "role": "load", "applies": "with a tow line", "order": 3}
     def one(c):
         x = made_up.ar1(0.6, 4000, rng, 137.0, 10.0)
         return member(x, {"tow.direction": c * np.pi / 4}, c, case=f"tow:\n  mode: {mode}\n  direction: 0 rad\n",
                       more={"tow_force": x} | ({"line_tension_1": x + 1} if mode == "line" else {}),
-                      attributes={"tow_force": line | {"role": "balance"}, "line_tension_1": line})
+                      attributes={"tow_force": line | {"role": "balance", "applies": "with a towed body"},
+                                  "line_tension_1": line})
     folder = made_up.write(tmp_path / "out", [one(c) for c in (0, 1) for _ in range(4)])
     report.main([str(folder), "-o", str(tmp_path / "page.html")])
     text, there = (tmp_path / "page.html").read_text(), mode == "line"

@@ -89,7 +89,7 @@ void bt_fuzz_field(const uint8_t *data, size_t n)
     bt_field f;
     bt_field_init(&f);
     bt_errors err = {0};
-    const bt_status status = bt_field_read_as(&f, path, nonconvex, &err);
+    const bt_status status = bt_field_read(&f, path, nonconvex, &err);
     bt_fuzz_reported(status, &err);
     for (bt_idx i = 0; i < f.n; i++) {
         const int corners = (int)(f.offsets[i + 1] - f.offsets[i]);

@@ -110,9 +110,9 @@ static void rest_costs_nothing_and_ends(void **state)
     assert_int_equal(w->cells->n_contacts, 0);
     assert_int_equal(w->cells->n_busy, 1);
     for (bt_gid g = 0; g < n; g++) before[g] = pose_of(w, g);
-    const int64_t listings = w->cells->n_listings;
+    double *listed = &w->cells->cell[w->cells->n - 1].search.margin_listed, kept = *listed *= 1 + 1e-12;
     for (int k = 0; k < 50; k++) bt_world_step(w);
-    assert_int_equal(w->cells->n_listings, listings);
+    assert_true(*listed == kept); // a new list would have its own margin
     for (bt_gid g = 0; g < n; g++) assert_same_pose(before[g], pose_of(w, g));
     for (bt_idx k = 0; k < w->cells->n - 1; k++) assert_null(w->cells->cell[k].search.pairs);
 
@@ -530,7 +530,7 @@ static void floes_find_a_body_at_rest(void **state)
     double deepest = 0;
     for (int i = 0; i < 300; i++) {
         bt_world_step(w);
-        deepest = bt_max(deepest, bt_world_overlap(w));
+        deepest = bt_max(deepest, bt_world_overlaps(w, 0).deepest);
     }
     assert_true(deepest < 0.01);
     assert_true(pose_of(w, body).x < 0);

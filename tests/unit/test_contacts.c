@@ -117,6 +117,19 @@ static contact *contacts_of(const bt_world *w, bt_idx *n)
     return c;
 }
 
+/// Cells that this detection has listed anew. The margin of their lists is moved by a trace, so that no later one
+/// looks like it.
+static int64_t new_lists(bt_world *w, double margin)
+{
+    int64_t n = 0;
+    for (bt_idx k = 0; k < w->cells->n; k++) {
+        double *listed = &w->cells->cell[k].search.margin_listed;
+        n += *listed == margin;
+        *listed *= 1 + 1e-12;
+    }
+    return n;
+}
+
 static void detect_equals_brute_force(void **state)
 {
     (void)state;
@@ -126,10 +139,12 @@ static void detect_equals_brute_force(void **state)
         const bool periodic = scene % 3 == 2;
         const double box = scene % 2 ? 12 : 25;
         bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
+        int64_t listings = 0;
         for (int step = 0; step < 60; step++) {
             // it comes and goes
             const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12));
             detect_all(w, margin);
+            listings += new_lists(w, margin);
             bt_manifold *want;
             bt_idx n, m;
             brute_force(w, margin, &want, &n);
@@ -147,7 +162,7 @@ static void detect_equals_brute_force(void **state)
         }
         labellings += w->cells->n_labellings;
         // labels and lists are in fact kept
-        assert_true(w->cells->n_labellings < 30 && w->cells->n_listings < 50 * w->cells->n);
+        assert_true(w->cells->n_labellings < 30 && listings < 50 * w->cells->n);
         bt_world_free(w);
     }
     assert_true(total > 10000 && labellings > 14); // and renewed
@@ -225,7 +240,8 @@ static void arms_meet(void **state)
             const double step = 1e-4;
             w->bodies.pose[m->b].x += step * m->nx;
             w->bodies.pose[m->b].y += step * m->ny;
-            if (bt_contacts_pair(w, m->a, m->b, 0.2, (int)(m->p[0].feature >> 31), &after, &gap, &axis))
+            if (bt_contacts_parts(w, m->a, m->b, (uint16_t[2]){0}, 0.2, (int)(m->p[0].feature >> 31), &after, &gap,
+                                  &axis))
                 CHECK_CLOSE(bt_min(after.p[0].gap, after.p[after.n_points - 1].gap),
                             bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) + step, 1e-7);
             w->bodies.pose[m->b].x -= step * m->nx;

@@ -73,7 +73,7 @@ static void write_row(void)
 static bt_status read_quietly(bt_field *f, bt_errors *err)
 {
     bt_field_init(f);
-    return bt_field_read(f, path, err);
+    return bt_field_read(f, path, BT_NONCONVEX_REFUSE, err);
 }
 
 static void assert_refused(bt_status want, const char *part)

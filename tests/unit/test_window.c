@@ -156,7 +156,7 @@ static void wait_for_a_place(void **state)
             assert_int_equal(w->window->renewed, 2);
             assert_true(at(w, 0, 5, 0) && at(w, 1, 20, 0));
         }
-        assert_true(bt_world_overlap(w) <= 1e-6);
+        assert_true(bt_world_overlaps(w, 0).deepest <= 1e-6);
         bt_world_free(w);
     }
 }
