@@ -66,7 +66,7 @@ bool bt_case_tow_start(const bt_case *c, double at[2]);
 struct bt_path;
 bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
 
-/// Distance from the body to the end of the domain ahead of the tow, m.
+/// Distance from the body to the end of the domain ahead of the tow, m; where no body is in the domain, its length.
 double bt_case_window_ahead(const bt_case *c);
 
 /// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case

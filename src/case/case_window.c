@@ -12,7 +12,9 @@ static const double room = 4;          // floe sizes of ice ahead and behind, at
 
 double bt_case_window_ahead(const bt_case *c)
 {
-    return bt_case_tow_sign(c) > 0 ? c->domain.x0 + c->domain.length - c->body.x : c->body.x - c->domain.x0;
+    const double length = c->domain.length,
+                 ahead = bt_case_tow_sign(c) > 0 ? c->domain.x0 + length - c->body.x : c->body.x - c->domain.x0;
+    return ahead > 0 && ahead <= length ? ahead : length;
 }
 
 void bt_case_window_follow(bt_case *c)

@@ -224,6 +224,17 @@ def test_a_damaged_result_is_not_continued(stopped):
     assert_same_result(whole, folder / "out")
 
 
+def test_without_a_body_in_a_domain_far_from_the_origin(tmp_path):
+    """Red when the file of all keys gives a distance ahead of a body that is not there, which no case may have."""
+    case = {"run": {"dt": 0.2, "duration": 4}, "domain": {"frame": "geographic", "x0": -17, "length": 5, "width": 4},
+            "body": {"shape": "none"}, "tow": {"mode": "none"},
+            "ice": {"concentration": 0.4, "size": 0.8, "thickness": 0.1}}
+    whole = run(tmp_path, case, "--quiet", name="whole")
+    run(tmp_path, case, "--quiet", "--steps", 10)
+    assert resumed(tmp_path, "out") == ""
+    assert_same_result(whole.dir, tmp_path / "out")
+
+
 def test_tables_and_fields_may_be_gone(tmp_path):
     """The checkpoint holds them: a run that goes on reads no file that the case names."""
     (tmp_path / "wind.csv").write_text("t,u,v\n0,1,0\n40,-2,3\n")
