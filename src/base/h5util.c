@@ -273,8 +273,12 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
         piece[k] = k == 1 ? chunk[1] : most[k];
     }
     const hid_t space = H5Screate_simple(rank, now, most), create = layout(h, rank, piece, packed);
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    // A packed chunk is written whole, once: HDF5 would keep the last one of each dataset until the next comes.
+    const hid_t access = H5Pcreate(H5P_DATASET_ACCESS);
+    if (packed) H5Pset_chunk_cache(access, H5D_CHUNK_CACHE_NSLOTS_DEFAULT, 0, H5D_CHUNK_CACHE_W0_DEFAULT);
+    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h, d >= 0);
+    H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;
