@@ -378,7 +378,7 @@ static bt_status finish(run *r, bt_errors *err)
 {
     char stopped[96] = "";
     bt_snapshot s = {0};
-    bt_status status = bt_running_save(r, &s, err); // before what is still open is closed
+    bt_status status = bt_running_save(r, &s, BT_CHECKPOINT_FILE, err); // before what is still open is closed
     r->totals.wall_time += bt_clock() - r->began;
     total_up(r);
     if (status == BT_OK) status = look_last(r, err);

@@ -29,6 +29,7 @@
 #include "base/h5read.h"
 #include "base/checksum.h"
 #include "base/snapshot.h"
+#include "snapshot_file.h"
 #include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-state-XXXXXX";
@@ -319,7 +320,7 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
     bt_snapshot s = {0};
     bt_snapshot_add_int(&s, "world/step", 3);
     must(bt_file_make_dir(in_folder("empty"), &err), &err);
-    must(bt_snapshot_write(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
+    must(write_snapshot(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
     const double revision[] = {1e300, 1e300}; // a number where a text is expected
     bt_snapshot_add(&s, "about/revision", BT_ITEM_F64, 2, 1, revision);
     for (int k = 0; k < 2; k++) {
@@ -328,7 +329,7 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
         assert_int_equal(bt_run_resume(&bt_comm_alone, &o, &err), BT_ERR_CASE);
         assert_true(err.n == 1 && strstr(err.text[0], "is missing"));
         bt_errors_free(&err);
-        must(bt_snapshot_write(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
+        must(write_snapshot(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
     }
     bt_snapshot_free(&s);
 }
