@@ -550,17 +550,68 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
-void bt_state_save_field(const bt_field *f, bt_snapshot *s)
+/// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
+static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
+                               bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    double most = 0;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
+    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    const size_t width = 2 * (size_t)most, size = width * sizeof(double);
+    double *mine = bt_alloc(PORTION, size), *all = bt_alloc(PORTION, size), *packed = bt_alloc(PORTION, size);
+    bt_gid *gid = bt_alloc(PORTION, sizeof *gid);
+    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    bt_status status = BT_OK;
+    if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
+    for (bt_gid from = 0; from < n && status == BT_OK; from += PORTION) {
+        const bt_gid end = n - from < PORTION ? n : from + PORTION;
+        bt_idx own = 0;
+        for (bt_gid g = from; g < end; g++) {
+            const bt_idx i = bt_world_index(w, g);
+            if (i < 0 || !bt_domain_owns(w, i)) continue;
+            memcpy(mine + (size_t)own * width, b->vertices + 2 * b->offset[i],
+                   2 * sizeof *mine * (size_t)bt_body_corners(b, i));
+            gid[own++] = g;
+        }
+        first[0] = from;
+        for (int k = 1; k <= c->size; k++) first[k] = end; // all to rank 0
+        status = bt_comm_rows_by_gid(c, first, own, gid, (int)width, mine, all, err);
+        if (status != BT_OK || c->rank != 0) continue;
+        for (bt_gid g = from; g < end; g++)
+            memcpy(packed + 2 * (offset[g] - offset[from]), all + (size_t)(g - from) * width,
+                   2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
+        bt_snapshot_put(s, offset[end] - offset[from], packed);
+    }
+    free(mine);
+    free(all);
+    free(packed);
+    free(gid);
+    free(first);
+    return status;
+}
+
+static void save_field_head(const bt_field *f, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
     bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
     bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
     bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
-    bt_snapshot_add(s, "field/vertices", BT_ITEM_F64, f->offsets[f->n], 2, f->vertices);
+}
+
+bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    double n = c->rank == 0 ? f->n : 0;
+    bt_comm_reduce(c, NULL, 0, &n, 1, NULL, 0);
+    if (c->rank == 0) save_field_head(f, s);
+    const bt_status status = save_outlines(w, c, (bt_gid)n, f->offsets, s, err);
+    if (c->rank != 0) return status;
     bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
     bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
     bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
+    return status;
 }
 
 void bt_state_load_field(bt_field *f, bt_snapshot *s)

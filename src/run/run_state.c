@@ -57,7 +57,9 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_er
     if (r->comm->rank == 0) {
         save_origin(r, s);
         save_case(r->c, s);
-        bt_state_save_field(&r->field, s);
+    }
+    if (status == BT_OK) status = bt_state_save_field(&r->field, r->w, r->comm, s, err); // agreed so far
+    if (r->comm->rank == 0) {
         bt_state_save_lead(&r->totals.lead, s);
         bt_state_save_stall(&r->totals.stall, s);
         bt_snapshot_add_int(s, "run/frames_due", r->frames_due);

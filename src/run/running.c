@@ -100,8 +100,14 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
         .outlines = f->outlines,
         .tolerance = r->w->par.tolerance,
     };
-    if (r->comm->rank == 0) r->field = *f;
-    else bt_field_free(f);
+    if (r->comm->rank == 0) {
+        r->field = *f;
+        free(r->field.vertices); // the bodies have them
+        r->field.vertices = NULL;
+        r->field.cap_vertices = 0;
+    } else {
+        bt_field_free(f);
+    }
     *f = (bt_field){0};
 }
 

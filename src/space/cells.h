@@ -71,16 +71,15 @@ typedef struct bt_contact {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
-    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
+    int32_t n;             ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
+    bt_idx pair;           ///< its pair in the cell
 } bt_contact;
 _Static_assert(sizeof(bt_contact) == 192, "three cache lines");
 
 /// What the sweep does not see of it.
 typedef struct bt_gaps {
-    double gap[2];         ///< m
-    double after[2];       ///< gaps that U2 leaves at the end of the step, m
+    double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
     double multiplier[2];  ///< multipliers of the position projection, kg m
-    int32_t pair;          ///< its pair in the cell
 } bt_gaps;
 
 /// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).

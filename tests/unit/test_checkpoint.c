@@ -210,7 +210,7 @@ static void save(const setting *t, const bt_world *w, bt_snapshot *s)
 {
     bt_errors err = {0};
     must(bt_state_save(w, &bt_comm_alone, s, &err), &err);
-    bt_state_save_field(&t->f, s);
+    must(bt_state_save_field(&t->f, w, &bt_comm_alone, s, &err), &err);
 }
 
 /// A world from a state, with the field that it holds.

@@ -157,7 +157,7 @@ static int make_states(void **state)
         for (int n = 0; n < 40; n++) bt_world_step(w);
         if (k == 0) bt_events_add(&w->events, 1, BT_EVENT_WAYPOINT, 1, 2); // one to change
         must(bt_state_save(w, &bt_comm_alone, &kept[k].state, &err), &err);
-        bt_state_save_field(&f, &kept[k].state);
+        must(bt_state_save_field(&f, w, &bt_comm_alone, &kept[k].state, &err), &err);
         bt_world_free(w);
         bt_roster_free(&roster);
         bt_field_free(&f);
