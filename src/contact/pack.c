@@ -199,7 +199,7 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
             bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
-        p->n_points = u->n;
+        p->n_points = (int16_t)u->n;
         for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
     }
 }

@@ -14,6 +14,7 @@
 #include "output/folder.h"
 #include "output/state.h"
 #include "base/table.h"
+#include "solve/solver.h"
 
 #define FRAMES_BY_DEFAULT 200
 
@@ -52,6 +53,7 @@ static void save_case(const bt_case *c, bt_snapshot *s)
 
 bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err)
 {
+    bt_solver_rest(r->w->solver);
     if (r->comm->rank == 0) bt_checkpoint_begin(s, r->o->dir, name, err);
     bt_status status = bt_state_save(r->w, r->comm, s, err);
     if (r->comm->rank == 0) {

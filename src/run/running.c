@@ -21,6 +21,7 @@
 #include "output/observe.h"
 #include "solve/batch.h"
 #include "solve/locked.h"
+#include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_check.h"
@@ -75,6 +76,7 @@ static bt_status record_frame(run *r, bt_errors *err)
 {
     if (!r->record) return BT_OK;
     r->framed = r->w->step;
+    bt_solver_rest(r->w->solver);
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     const bt_frame_line line = bt_gather_line(r->w);
