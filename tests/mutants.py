@@ -150,8 +150,8 @@ MUTANTS = {
         ("bt_phases_run(w, push, NULL, w->solver->shift, &t);", "", "no load, no imbalance"),
     ]),
     "src/solve/project.c": (PROJECT, [
-        ("t->most = bt_max(t->most, -g->after[i]);", "t->most = bt_max(t->most, -g->gap[i]);", "overlap of the start"),
-        ("g->after[i] += cell->laws.limits[j].grown[i];", ";", "crushed ice is pushed apart"),
+        ("g->gap[i] += w->par.dt * ", "if (w->par.dt < 0) g->gap[i] += w->par.dt * ", "overlap of the start"),
+        ("g->gap[i] += cell->laws.limits[j].grown[i];", ";", "crushed ice is pushed apart"),
         ("on = on || g->multiplier[i] > 0 ||", "on = on ||", "contacts that push are not listed"),
         ("s->shifted = t.most > w->par.slop;", "s->shifted = t.most > 2 * w->par.slop;", "no shift below two slops"),
         (".tolerance = 0.1 * w->par.slop", ".tolerance = w->par.slop", "projection ends early"),

@@ -33,7 +33,7 @@ void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows);
 void bt_slab_close(bt_slab *s);
 
 /// Rows one after the other by way of a buffer of at most BT_SLAB_BYTES, so that no rank holds them all at once.
-#define BT_SLAB_BYTES ((size_t)1 << 20)
+#define BT_SLAB_BYTES ((size_t)1 << 18)
 
 typedef struct bt_rows {
     bt_slab *s;

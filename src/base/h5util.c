@@ -195,13 +195,23 @@ static hid_t layout(const bt_h5 *h, int rank, const hsize_t *chunk, bool packed)
     return p;
 }
 
+/// How a dataset is open. A packed chunk is written whole, once: HDF5 would keep those of each dataset, to 1 MB.
+static hid_t opened(bool packed)
+{
+    const hid_t p = H5Pcreate(H5P_DATASET_ACCESS);
+    if (packed) H5Pset_chunk_cache(p, H5D_CHUNK_CACHE_NSLOTS_DEFAULT, 0, H5D_CHUNK_CACHE_W0_DEFAULT);
+    return p;
+}
+
 hid_t bt_h5_dataset(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk)
 {
     if (idle(h)) return -1;
     const hid_t space = H5Screate_simple(rank, dims, NULL);
-    const hid_t create = layout(h, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0);
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    const hid_t create = layout(h, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0),
+                access = opened(chunk > 0);
+    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h, d >= 0);
+    H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;
@@ -272,9 +282,11 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
         most[k] = now[k] ? now[k] : 1;
         piece[k] = k == 1 ? chunk[1] : most[k];
     }
-    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h, rank, piece, packed);
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h, rank, piece, packed),
+                access = opened(packed);
+    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h, d >= 0);
+    H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;

@@ -20,15 +20,30 @@ static size_t bytes_of(const bt_item *i) { return (size_t)i->n * (size_t)i->widt
 
 // --- adding ----------------------------------------------------------------------------------------------------------
 
-void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data)
+void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width)
 {
     if (s->n == s->cap) s->item = bt_realloc(s->item, (size_t)(s->cap = s->cap ? 2 * s->cap : 64), sizeof *s->item);
     bt_item *i = &s->item[s->n++];
     *i = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
-    const size_t bytes = bytes_of(i);
-    i->data = bt_alloc(bytes, 1);
-    if (data && bytes) memcpy(i->data, data, bytes);
+    s->rows = 0;
+    if (s->file) bt_snapshot_file_begin(s, i);
+    else i->data = bt_alloc(bytes_of(i), 1);
     return i->data;
+}
+
+void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows)
+{
+    const bt_item *i = &s->item[s->n - 1];
+    const size_t row = (size_t)i->width * bt_item_size(i->type);
+    if (s->file) bt_snapshot_file_put(s, i, n, rows);
+    else if (n > 0) memcpy((char *)i->data + (size_t)s->rows * row, rows, (size_t)n * row);
+    s->rows += n;
+}
+
+void bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data)
+{
+    bt_snapshot_begin(s, name, type, n, width);
+    bt_snapshot_put(s, n, data);
 }
 
 void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text)
@@ -55,6 +70,7 @@ void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row 
 
 void bt_snapshot_free(bt_snapshot *s)
 {
+    bt_snapshot_drop(s);
     for (int k = 0; k < s->n; k++) {
         free(s->item[k].name);
         free(s->item[k].data);
@@ -179,7 +195,7 @@ void bt_snapshot_share(const bt_comm *c, bt_snapshot *s)
         char name[160] = "";
         if (c->rank == 0) snprintf(name, sizeof name, "%s", s->item[k].name);
         bt_comm_bcast(c, name, sizeof name);
-        if (c->rank != 0) bt_snapshot_add(s, name, (bt_item_type)head[1], head[2], (int)head[3], NULL);
+        if (c->rank != 0) bt_snapshot_begin(s, name, (bt_item_type)head[1], head[2], (int)head[3]);
         bt_comm_bcast(c, s->item[k].data, bytes_of(&s->item[k]));
     }
 }

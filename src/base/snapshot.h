@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A set of named arrays: what a checkpoint is in memory.
+// A set of named arrays: what a checkpoint is.
 //
 // Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows
-// what the arrays mean. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it
+// what the arrays mean. A set that is read lies in memory. One that is saved goes to its file array by array: the state
+// of a run is never there twice. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it
 // took: they are not part of it, and are not compared.
 #ifndef BT_SNAPSHOT_H
 #define BT_SNAPSHOT_H
@@ -26,7 +27,7 @@ typedef struct bt_item {
     bt_item_type type;
     int64_t n;   ///< rows; of a text its bytes with the 0 at the end
     int width;   ///< numbers a row
-    void *data;  ///< [n][width]
+    void *data;  ///< [n][width]; NULL where it has gone to the file
 } bt_item;
 
 typedef struct bt_snapshot {
@@ -35,6 +36,8 @@ typedef struct bt_snapshot {
     const char *path; ///< of the file, for messages
     bt_errors *err;   ///< where bt_snapshot_take complains
     bool faulty;      ///< it has
+    int64_t rows;     ///< put into the array that was added last
+    struct bt_snapshot_file *file; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
 } bt_snapshot;
 
 /// A member of a struct that is saved.
@@ -49,8 +52,12 @@ size_t bt_item_size(bt_item_type type); ///< bytes of one number
 /// number `at` of an array in digits that give it back; returns out
 const char *bt_item_number(const bt_item *i, int64_t at, char out[40]);
 
-/// Add an array [n][width]; data are copied, or zeros. Returns where it lies.
-void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data);
+/// Add an array [n][width], to be filled by bt_snapshot_put. Returns where it lies, zeros; NULL in a file.
+void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width);
+/// The next n rows of the array added last.
+void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows);
+/// Add an array [n][width]; data are copied.
+void bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data);
 void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text);
 void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value);
 void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value);
@@ -84,9 +91,20 @@ void bt_snapshot_free(bt_snapshot *s);
 /// What an array is, its units (NULL: it is text) and its axes, as in h5axes.h; NULL where that is not known.
 typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 
-/// Into an HDF5 file protected by a checksum, with what each array is unless meaning is NULL, and back; errors as
-/// bt_checksum_check, and BT_ERR_IO.
-bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err);
+/// An HDF5 file, which what is added to s from here on goes to, with what each array is unless meaning is NULL. s is
+/// empty before. What fails here or on the way, bt_snapshot_close returns.
+void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err);
+/// Nothing more comes: the file is completed, protected by a checksum, and closed.
+void bt_snapshot_end(bt_snapshot *s, bt_errors *err);
+/// The same, unless it has been, and the file stays: without this call bt_snapshot_free removes it. Errors: BT_ERR_IO.
+bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err);
+/// Remove the file of a set that is given up.
+void bt_snapshot_drop(bt_snapshot *s);
+/// Array i, the last one, in the file, and the next n rows of it.
+void bt_snapshot_file_begin(bt_snapshot *s, const bt_item *i);
+void bt_snapshot_file_put(bt_snapshot *s, const bt_item *i, int64_t n, const void *rows);
+
+/// A file in memory. Errors as bt_checksum_check, and BT_ERR_IO.
 bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/h5axes.h"
 #include "base/h5read.h"
@@ -36,33 +37,105 @@ static void enter(bt_h5 *h, const bt_snapshot *s, int k)
     bt_h5_group(h, group);
 }
 
-bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
-{
+struct bt_snapshot_file {
     bt_h5 h;
-    bt_status status = bt_h5_create_with_room(&h, path, err);
-    if (status != BT_OK) return status;
-    bt_h5_describe_file(&h, NULL);
+    char *path;
+    bt_item_meaning *meaning;
+    hid_t dataset; ///< of the array added last, −1 = none
+    bool ended;    ///< closed in HDF5
+    bt_status status; ///< of the whole, then
+};
+
+void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
+{
+    struct bt_snapshot_file *f = s->file = bt_alloc(1, sizeof *f);
+    *f = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
+    if (bt_h5_create_with_room(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
+}
+
+/// The array added last has all its rows.
+static void end_array(bt_snapshot *s)
+{
+    struct bt_snapshot_file *f = s->file;
+    if (s->n == 0) return;
+    const bt_item *i = &s->item[s->n - 1];
+    if (f->dataset >= 0) bt_h5_check(&f->h, H5Dclose(f->dataset) >= 0); // small data go to the file only now
+    f->dataset = -1;
+    const char *units, *axes, *text = f->meaning ? f->meaning(i->name, &units, &axes) : NULL;
+    if (!text) return;
     char name[160];
-    for (int k = 0; k < s->n; k++) {
-        const bt_item *i = &s->item[k];
-        enter(&h, s, k);
-        snprintf(name, sizeof name, "/%s", i->name);
-        if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&h, name, i->data);
-        else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
-        const char *units, *axes, *text = meaning ? meaning(i->name, &units, &axes) : NULL;
-        if (!text) continue;
-        if (units) bt_h5_attr_text(&h, name, "units", units);
-        bt_h5_attr_text(&h, name, "long_name", text);
-    }
+    snprintf(name, sizeof name, "/%s", i->name);
+    if (units) bt_h5_attr_text(&f->h, name, "units", units);
+    bt_h5_attr_text(&f->h, name, "long_name", text);
+}
+
+void bt_snapshot_file_begin(bt_snapshot *s, const bt_item *i)
+{
+    struct bt_snapshot_file *f = s->file;
+    s->n--;
+    end_array(s);
+    s->n++;
+    enter(&f->h, s, s->n - 1);
+    char name[160];
+    snprintf(name, sizeof name, "/%s", i->name);
+    if (i->type != BT_ITEM_TEXT)
+        f->dataset = bt_h5_dataset(&f->h, name, memory_type(i->type), i->width > 1 ? 2 : 1,
+                                   (hsize_t[]){(hsize_t)i->n, (hsize_t)i->width}, 0);
+}
+
+void bt_snapshot_file_put(bt_snapshot *s, const bt_item *i, int64_t n, const void *rows)
+{
+    struct bt_snapshot_file *f = s->file;
+    char name[160];
+    snprintf(name, sizeof name, "/%s", i->name);
+    if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&f->h, name, rows);
+    else bt_h5_write_rows(&f->h, f->dataset, memory_type(i->type), false, 0, (hsize_t)s->rows, (hsize_t)n, rows);
+}
+
+void bt_snapshot_end(bt_snapshot *s, bt_errors *err)
+{
+    struct bt_snapshot_file *f = s->file;
+    if (f->ended) return;
+    f->ended = true;
+    f->h.err = err;
+    end_array(s);
     // The axes last: a coordinate such as /history/time may follow what it belongs to.
-    for (int k = 0; meaning && k < s->n; k++) {
+    for (int k = 0; f->meaning && k < s->n; k++) {
+        char name[160];
         const char *units, *axes;
-        if (s->item[k].type == BT_ITEM_TEXT || !meaning(s->item[k].name, &units, &axes)) continue;
+        if (s->item[k].type == BT_ITEM_TEXT || !f->meaning(s->item[k].name, &units, &axes)) continue;
         snprintf(name, sizeof name, "/%s", s->item[k].name);
-        bt_h5_axes(&h, name, axes);
+        bt_h5_axes(&f->h, name, axes);
     }
-    status = bt_h5_close(&h);
-    return status == BT_OK ? bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, err) : status;
+    f->status = bt_h5_close(&f->h);
+    if (f->status == BT_OK) f->status = bt_checksum_write(f->path, BT_CHECKSUM_CHECKPOINT, err);
+}
+
+static void release(bt_snapshot *s, bool keep)
+{
+    if (!keep) unlink(s->file->path);
+    free(s->file->path);
+    free(s->file);
+    s->file = NULL;
+}
+
+bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err)
+{
+    bt_snapshot_end(s, err);
+    const bt_status status = s->file->status;
+    release(s, status == BT_OK);
+    return status;
+}
+
+void bt_snapshot_drop(bt_snapshot *s)
+{
+    if (!s->file) return;
+    bt_errors unheard = {0};
+    if (s->file->dataset >= 0) H5Dclose(s->file->dataset);
+    s->file->h.err = &unheard;
+    if (!s->file->ended) bt_h5_close(&s->file->h);
+    bt_errors_free(&unheard);
+    release(s, false);
 }
 
 enum { MOST_COLUMNS = 1000 };
@@ -124,7 +197,7 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
         if (length < 2 || length >= (ssize_t)sizeof full || !is_name(full) || !describe(o, &type, &n, &width)) {
             result = -1;
         } else {
-            void *to = bt_snapshot_add(s, full + 1, type, n, width, NULL);
+            void *to = bt_snapshot_begin(s, full + 1, type, n, width);
             const hid_t stored = H5Dget_type(o);
             if (n * width > 0 &&
                 H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0)

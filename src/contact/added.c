@@ -100,7 +100,7 @@ void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_tota
     const bool remembers = of->remember(&x, number);
     add_numbers(law, false, number, totals);
     if (!remembers) return;
-    bt_memory r = bt_law_names(w, &t->search.pairs[t->gaps[j].pair], law);
+    bt_memory r = bt_law_names(w, &t->search.pairs[t->contacts[j].pair], law);
     r.n_points = u->n;
     memcpy(r.value, x.value, sizeof r.value);
     bt_law_put(t, l->record[law], &r);

@@ -150,7 +150,7 @@ double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
     if (deepest == 0 || l->record[BT_LAW_RAFTING] >= 0) return 0;
-    const bt_pair *p = &t->search.pairs[t->gaps[j].pair];
+    const bt_pair *p = &t->search.pairs[t->contacts[j].pair];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
     r.n_points = u->n;
     for (int i = 0; i < u->n; i++) r.feature[i] = p->feature[i], r.value[i] = l->depth[i];

@@ -173,9 +173,11 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         }
         if (!near) bt_pairs_add_near(t, i);
         double gap;
+        int32_t axis = p->axis;
         bt_manifold *m = bt_pack_next(&s->pack, i);
         const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin,
-                                             p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
+                                             p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &axis);
+        p->axis = (int16_t)axis;
         p->reach = gap + paths;
         if (!touch) {
             p->n_points = 0;

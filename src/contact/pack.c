@@ -103,8 +103,9 @@ static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt
     const bt_inv ia = w->bodies.inv[m->a], ib = w->bodies.inv[m->b];
     const bt_point *q = &m->p[0];
     *u = (bt_contact){
-        .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0]};
-    *g = (bt_gaps){.pair = pair};
+        .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0],
+        .pair = pair};
+    *g = (bt_gaps){0};
     const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
     const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt,
                  xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
@@ -118,8 +119,9 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
     const bt_bodies *b = &w->bodies;
     const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
     const double nx = m->nx, ny = m->ny;
-    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points};
-    *g = (bt_gaps){.pair = pair};
+    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points,
+                      .pair = pair};
+    *g = (bt_gaps){0};
     for (int i = 0; i < m->n_points; i++) {
         const bt_point *q = &m->p[i];
         u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
@@ -197,7 +199,7 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
             bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
-        p->n_points = u->n;
+        p->n_points = (int16_t)u->n;
         for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
     }
 }
@@ -208,7 +210,7 @@ void bt_pack_store(bt_world *w, bt_idx k)
     for (bt_idx i = 0; i < t->n_contacts; i++) {
         const bt_contact *u = &t->contacts[i];
         if (u->n == 0) continue; // sheets have a record (contact/raft.h)
-        bt_pair *p = &t->search.pairs[t->gaps[i].pair];
+        bt_pair *p = &t->search.pairs[u->pair];
         p->ln[0] = u->ln[0];
         p->ln[1] = u->ln[1];
         p->lt = u->lt;

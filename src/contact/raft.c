@@ -159,7 +159,7 @@ double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     bool begins = false;
     for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && bt_raft_gives_way(u, l, i));
     if (!begins || at >= 0) return 0;
-    bt_memory r = bt_law_names(w, &t->search.pairs[t->gaps[j].pair], BT_LAW_RAFTING);
+    bt_memory r = bt_law_names(w, &t->search.pairs[t->contacts[j].pair], BT_LAW_RAFTING);
     r.n_points = 2;
     bt_law_put(t, -1, &r);
     return 0;

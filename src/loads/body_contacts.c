@@ -85,8 +85,7 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(
-            b, u, cell->search.pairs[cell->gaps[u - cell->contacts].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner = corner_of(b, u, cell->search.pairs[u->pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];

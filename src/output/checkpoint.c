@@ -13,11 +13,25 @@
 #include "base/snapshot.h"
 #include "output/checkpoint_names.h"
 
-bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
+static char *path_of_part(const char *dir, const char *name)
+{
+    char *path = bt_file_join(dir, name), *part = bt_text_of("%s.tmp", path);
+    free(path);
+    return part;
+}
+
+void bt_checkpoint_begin(bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
+{
+    char *part = path_of_part(dir, name);
+    bt_snapshot_create(s, part, bt_checkpoint_meaning, err);
+    free(part);
+}
+
+bt_status bt_checkpoint_write(bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
 {
     char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE),
-         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = bt_text_of("%s.tmp", path);
-    bt_status status = bt_snapshot_write(s, part, bt_checkpoint_meaning, err);
+         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = path_of_part(dir, name);
+    bt_status status = bt_snapshot_close(s, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // One that has been damaged meanwhile must not take the place of a sound one.
         bt_errors unheard = {0};

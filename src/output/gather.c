@@ -139,19 +139,24 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     bt_observe_contact_force(w, force);
     bt_observe_net_force(c, w, roster->n_free, net);
     list l = make_list(c, w, roster);
-    bt_frame_row *rows = bt_alloc((size_t)l.n, sizeof *rows), *block = bt_alloc((size_t)l.count, sizeof *block);
+    const bool alone = c->size == 1; // all bodies are of one block: each row is put where it belongs
+    bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);
     for (bt_idx i = 0; i < l.n; i++) {
         const bt_idx k = l.body[i];
-        rows[i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
+        rows[alone ? l.gid[i] : i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
                                  .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y,
                                  .fx = net[k][0], .fy = net[k][1]};
     }
     free(force);
     free(net);
-    const bt_status status =
-        bt_comm_rows_by_gid(c, l.first, l.n, l.gid, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
+    bt_frame_row *block = rows;
+    bt_status status = BT_OK;
+    if (!alone) {
+        block = bt_alloc((size_t)l.count, sizeof *block);
+        status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
+        free(rows);
+    }
     free_list(&l);
-    free(rows);
     *out = status == BT_OK ? block : NULL;
     if (status != BT_OK) free(block);
     return status;

@@ -324,7 +324,7 @@ static bt_status hand_in(const bt_record *r, bt_errors *err)
     return status;
 }
 
-bt_status bt_record_close(bt_record *r, const bt_run_totals *t, const bt_snapshot *last, bt_errors *err)
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bt_errors *err)
 {
     const bool first = r->comm->rank == 0;
     char *xdmf = first ? bt_record_xdmf(r) : NULL;

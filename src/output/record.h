@@ -231,7 +231,7 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, c
 /// NULL closes a run that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no
 /// summary. last: the checkpoint of the end, on rank 0 (others and without: NULL), written when the result stands and
 /// before the summary does: a folder with a summary lacks nothing.
-bt_status bt_record_close(bt_record *r, const bt_run_totals *t, const bt_snapshot *last, bt_errors *err);
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bt_errors *err);
 
 /// Collective. Close and free a record that is of no use, and remove result.part.h5.
 void bt_record_abandon(bt_record *r);

@@ -149,15 +149,13 @@ void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
-/// What a body carries from step to step, as it travels to rank 0. Everything else about it follows from the case and
+/// What a body carries from step to step. Everything else about it follows from the case and
 /// the field.
 typedef struct {
     double pose[3], vel[3], path;
     int32_t cell[2], copy, lap;
     int64_t disturbed;
 } body_row;
-enum { BODY_WIDTH = sizeof(body_row) / sizeof(double) };
-_Static_assert(sizeof(body_row) % sizeof(double) == 0, "a body is a row of doubles");
 
 /// Its columns in the file.
 static const bt_state_row body_columns[] = {
@@ -204,13 +202,23 @@ static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, ch
     }
 }
 
+/// Rows that a column is taken from at a time.
+enum { PORTION = 1024 };
+
 static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows,
                          size_t size, int64_t n)
 {
     for (int k = 0; k < n_columns; k++) {
         char name[64];
         snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
-        column(&columns[k], rows, size, n, bt_snapshot_add(s, name, columns[k].type, n, columns[k].width, NULL), true);
+        bt_snapshot_begin(s, name, columns[k].type, n, columns[k].width);
+        char *portion = bt_alloc(PORTION * (size_t)columns[k].width, bt_item_size(columns[k].type));
+        for (int64_t i = 0; i < n; i += PORTION) {
+            const int64_t now = n - i < PORTION ? n - i : PORTION;
+            column(&columns[k], (char *)rows + (size_t)i * size, size, now, portion, true);
+            bt_snapshot_put(s, now, portion);
+        }
+        free(portion);
     }
 }
 
@@ -232,28 +240,39 @@ static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row 
     return rows;
 }
 
+/// Column by column: rows of all bodies at once would be the largest thing in memory on rank 0, twice.
 static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;
+    const int64_t count = c->rank == 0 ? b->n_global : 0;
     bt_idx n = 0;
     bt_gid *gid = bt_alloc((size_t)b->n, sizeof *gid);
-    body_row *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    bt_idx *body = bt_alloc((size_t)b->n, sizeof *body);
     for (bt_idx i = 0; i < b->n; i++) {
         if (!bt_domain_owns(w, i)) continue;
         gid[n] = b->gid[i];
-        mine[n++] = row_of(b, i);
+        body[n++] = i;
     }
     int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
     for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
-    const int64_t count = c->rank == 0 ? b->n_global : 0;
-    body_row *all = bt_alloc((size_t)count, sizeof *all);
-    const bt_status status = bt_comm_rows_by_gid(c, first, n, gid, BODY_WIDTH, (const double *)(const void *)mine,
-                                                 (double *)(void *)all, err);
-    if (status == BT_OK && c->rank == 0)
-        save_columns(s, "bodies", body_columns, N_OF(body_columns), all, sizeof *all, count);
-    free(all);
+    bt_status status = BT_OK;
+    for (int k = 0; k < N_OF(body_columns) && status == BT_OK; k++) {
+        bt_state_row in_row = body_columns[k];
+        const size_t bytes = bt_item_size(in_row.type) * (size_t)in_row.width, width = (bytes + 7) / 8;
+        double *mine = bt_alloc((size_t)n, width * sizeof *mine), *all = bt_alloc((size_t)count, width * sizeof *all);
+        for (bt_idx i = 0; i < n; i++) {
+            const body_row row = row_of(b, body[i]);
+            memcpy(mine + (size_t)i * width, (const char *)&row + in_row.offset, bytes);
+        }
+        status = bt_comm_rows_by_gid(c, first, n, gid, (int)width, mine, all, err);
+        free(mine);
+        in_row.offset = 0;
+        if (status == BT_OK && c->rank == 0)
+            save_columns(s, "bodies", &in_row, 1, all, width * sizeof *all, count);
+        free(all);
+    }
     free(first);
-    free(mine);
+    free(body);
     free(gid);
     return status;
 }
@@ -297,8 +316,8 @@ static void renew_contacts(bt_snapshot *s)
     bt_snapshot_take(s, "contacts/impulse", BT_ITEM_F64, n, 2, impulse);
     bt_snapshot_take(s, "contacts/friction", BT_ITEM_F64, n, 1, friction);
     bt_snapshot_take(s, "contacts/crushed", BT_ITEM_U8, n, 1, crushed);
-    double *value = bt_snapshot_add(s, "contacts/value", BT_ITEM_F64, n, 4, NULL);
-    uint16_t *law = bt_snapshot_add(s, "contacts/law", BT_ITEM_U16, n, 1, NULL);
+    double *value = bt_snapshot_begin(s, "contacts/value", BT_ITEM_F64, n, 4);
+    uint16_t *law = bt_snapshot_begin(s, "contacts/law", BT_ITEM_U16, n, 1);
     for (int64_t k = 0; k < n && !s->faulty; k++) {
         value[4 * k] = impulse[2 * k], value[4 * k + 1] = impulse[2 * k + 1], value[4 * k + 2] = friction[k];
         law[k] = crushed[k] ? BT_LAW_CRUSHING : BT_LAW_RIGID;
@@ -377,10 +396,13 @@ static void load_added_forces(bt_forces *f, bt_snapshot *s)
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
-    bt_memory *mine = bt_cells_take_memory(w, &n);
-    const double *rows = (const double *)(const void *)mine;
-    bt_memory *memory = (bt_memory *)(void *)bt_comm_gather(c, n, MEMORY_WIDTH, rows, &all);
-    free(mine);
+    bt_memory *memory = bt_cells_take_memory(w, &n);
+    all = n;
+    if (c->size > 1) {
+        bt_memory *mine = memory;
+        memory = (bt_memory *)(void *)bt_comm_gather(c, n, MEMORY_WIDTH, (const double *)(const void *)mine, &all);
+        free(mine);
+    }
     if (c->rank == 0) {
         if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&memory[k]);
@@ -521,17 +543,68 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
-void bt_state_save_field(const bt_field *f, bt_snapshot *s)
+/// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
+static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
+                               bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    double most = 0;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
+    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    const size_t width = 2 * (size_t)most, size = width * sizeof(double);
+    double *mine = bt_alloc(PORTION, size), *all = bt_alloc(PORTION, size), *packed = bt_alloc(PORTION, size);
+    bt_gid *gid = bt_alloc(PORTION, sizeof *gid);
+    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    bt_status status = BT_OK;
+    if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
+    for (bt_gid from = 0; from < n && status == BT_OK; from += PORTION) {
+        const bt_gid end = n - from < PORTION ? n : from + PORTION;
+        bt_idx own = 0;
+        for (bt_gid g = from; g < end; g++) {
+            const bt_idx i = bt_world_index(w, g);
+            if (i < 0 || !bt_domain_owns(w, i)) continue;
+            memcpy(mine + (size_t)own * width, b->vertices + 2 * b->offset[i],
+                   2 * sizeof *mine * (size_t)bt_body_corners(b, i));
+            gid[own++] = g;
+        }
+        first[0] = from;
+        for (int k = 1; k <= c->size; k++) first[k] = end; // all to rank 0
+        status = bt_comm_rows_by_gid(c, first, own, gid, (int)width, mine, all, err);
+        if (status != BT_OK || c->rank != 0) continue;
+        for (bt_gid g = from; g < end; g++)
+            memcpy(packed + 2 * (offset[g] - offset[from]), all + (size_t)(g - from) * width,
+                   2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
+        bt_snapshot_put(s, offset[end] - offset[from], packed);
+    }
+    free(mine);
+    free(all);
+    free(packed);
+    free(gid);
+    free(first);
+    return status;
+}
+
+static void save_field_head(const bt_field *f, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
     bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
     bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
     bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
-    bt_snapshot_add(s, "field/vertices", BT_ITEM_F64, f->offsets[f->n], 2, f->vertices);
+}
+
+bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    double n = c->rank == 0 ? f->n : 0;
+    bt_comm_reduce(c, NULL, 0, &n, 1, NULL, 0);
+    if (c->rank == 0) save_field_head(f, s);
+    const bt_status status = save_outlines(w, c, (bt_gid)n, f->offsets, s, err);
+    if (c->rank != 0) return status;
     bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
     bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
     bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
+    return status;
 }
 
 void bt_state_load_field(bt_field *f, bt_snapshot *s)

@@ -22,8 +22,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 /// ("tow/vessel_vx"); NULL = all are numbers. Those of the bodies are not looked at.
 const char *bt_state_not_finite(const bt_world *w, char name[64]);
 
-/// The ice field at time zero; on rank 0.
-void bt_state_save_field(const bt_field *f, bt_snapshot *s);
+/// Collective. The ice field at time zero, on rank 0. Its outlines are those of the bodies, which keep them to the bit:
+/// f->vertices may be NULL. Errors: BT_ERR_NUMERIC.
+bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 void bt_state_load_field(bt_field *f, bt_snapshot *s);
 
 /// Structs of the run beside the world, by their tables.

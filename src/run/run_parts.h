@@ -72,8 +72,9 @@ bt_status bt_running_frame(bt_running *r, bt_errors *err);
 /// everything but the lock. Returns the status of the run.
 bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err);
 
-/// Collective, between steps. The whole state of the run; complete on rank 0. Errors: BT_ERR_IO, BT_ERR_NUMERIC.
-bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err);
+/// Collective, between steps. The whole state of the run, on rank 0 into a checkpoint of this name that is begun here.
+/// Errors: BT_ERR_IO, BT_ERR_NUMERIC.
+bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err);
 
 /// Collective. Publish the record and write a checkpoint of this name.
 bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err);

@@ -14,6 +14,7 @@
 #include "output/folder.h"
 #include "output/state.h"
 #include "base/table.h"
+#include "solve/solver.h"
 
 #define FRAMES_BY_DEFAULT 200
 
@@ -50,13 +51,17 @@ static void save_case(const bt_case *c, bt_snapshot *s)
     free(text);
 }
 
-bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
+bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err)
 {
+    bt_solver_rest(r->w->solver);
+    if (r->comm->rank == 0) bt_checkpoint_begin(s, r->o->dir, name, err);
     bt_status status = bt_state_save(r->w, r->comm, s, err);
     if (r->comm->rank == 0) {
         save_origin(r, s);
         save_case(r->c, s);
-        bt_state_save_field(&r->field, s);
+    }
+    if (status == BT_OK) status = bt_state_save_field(&r->field, r->w, r->comm, s, err); // agreed so far
+    if (r->comm->rank == 0) {
         bt_state_save_lead(&r->totals.lead, s);
         bt_state_save_stall(&r->totals.stall, s);
         bt_snapshot_add_int(s, "run/frames_due", r->frames_due);
@@ -64,6 +69,7 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
         bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
         bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->began);
         if (status == BT_OK) status = bt_record_save(r->record, r->frames, s, err);
+        bt_snapshot_end(s, err);
     }
     return bt_comm_agree(r->comm, status);
 }
@@ -74,7 +80,7 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
     bt_status status = bt_record_publish(r->record, err);
     if (status != BT_OK) return status;
     bt_snapshot s = {0};
-    status = bt_running_save(r, &s, err);
+    status = bt_running_save(r, &s, name, err);
     if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, name, err);
     if (status == BT_OK && r->comm->rank == 0 && r->until < 0) bt_folder_settle(r->o->dir);
     bt_snapshot_free(&s);

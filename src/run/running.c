@@ -21,6 +21,7 @@
 #include "output/observe.h"
 #include "solve/batch.h"
 #include "solve/locked.h"
+#include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_check.h"
@@ -75,6 +76,7 @@ static bt_status record_frame(run *r, bt_errors *err)
 {
     if (!r->record) return BT_OK;
     r->framed = r->w->step;
+    bt_solver_rest(r->w->solver);
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     const bt_frame_line line = bt_gather_line(r->w);
@@ -100,8 +102,14 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
         .outlines = f->outlines,
         .tolerance = r->w->par.tolerance,
     };
-    if (r->comm->rank == 0) r->field = *f;
-    else bt_field_free(f);
+    if (r->comm->rank == 0) {
+        r->field = *f;
+        free(r->field.vertices); // the bodies have them
+        r->field.vertices = NULL;
+        r->field.cap_vertices = 0;
+    } else {
+        bt_field_free(f);
+    }
     *f = (bt_field){0};
 }
 
@@ -378,7 +386,7 @@ static bt_status finish(run *r, bt_errors *err)
 {
     char stopped[96] = "";
     bt_snapshot s = {0};
-    bt_status status = bt_running_save(r, &s, err); // before what is still open is closed
+    bt_status status = bt_running_save(r, &s, BT_CHECKPOINT_FILE, err); // before what is still open is closed
     r->totals.wall_time += bt_clock() - r->began;
     total_up(r);
     if (status == BT_OK) status = look_last(r, err);

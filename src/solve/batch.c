@@ -65,7 +65,7 @@ static void put_projection(bt_batch *o, int l, const bt_contact *u, const bt_gap
     for (int c = 0; c < 2; c++) {
         const bool there = c < u->n;
         o->mn[c][l] = there ? u->mn[c] : 0;
-        o->bias[c][l] = there ? g->after[c] : 0;
+        o->bias[c][l] = there ? g->gap[c] : 0;
         o->x[c][l] = there ? g->multiplier[c] : 0;
     }
     o->x[2][l] = o->before[2][l] = 0;
@@ -95,7 +95,7 @@ static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
 static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_batch kind)
 {
     if (cell->work.n_batches == cell->work.cap_batches) {
-        const bt_idx cap = bt_max(LANES, 2 * cell->work.cap_batches);
+        const bt_idx cap = cell->work.cap_batches + bt_max(2, cell->work.cap_batches / 4);
         bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
         if (cell->work.n_batches > 0) memcpy(more, cell->work.batch, (size_t)cell->work.n_batches * sizeof *more);
         free(cell->work.batch);

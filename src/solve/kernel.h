@@ -128,7 +128,7 @@ static inline double bt_contact_residual(const bt_contact *u, const bt_limit *k,
 static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double slop, int i, const bt_vel *da,
                                 const bt_vel *db)
 {
-    return bt_normal_velocity(u, i, da, db) + g->after[i] + slop;
+    return bt_normal_velocity(u, i, da, db) + g->gap[i] + slop;
 }
 
 /// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the

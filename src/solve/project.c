@@ -29,9 +29,9 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
         for (int i = 0; i < 3; i++) cell->work.before[j][i] = 0;
         for (int i = 0; i < u->n; i++) {
             g->multiplier[i] = 0;
-            g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (cell->laws.limits) g->after[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
-            t->most = bt_max(t->most, -g->after[i]);
+            g->gap[i] += w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
+            if (cell->laws.limits) g->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
+            t->most = bt_max(t->most, -g->gap[i]);
         }
     }
 }

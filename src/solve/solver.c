@@ -30,9 +30,16 @@ void bt_solver_free(bt_solver *s)
 {
     if (!s) return;
     bt_islands_free(s->islands);
+    bt_solver_rest(s);
+    free(s);
+}
+
+void bt_solver_rest(bt_solver *s)
+{
     free(s->before);
     free(s->shift);
-    free(s);
+    s->before = s->shift = NULL;
+    s->cap_before = s->cap_bodies = 0;
 }
 
 /// The line, in the pass of the last cell on the rank that owns the large bodies.

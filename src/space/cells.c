@@ -448,7 +448,8 @@ static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
         }
         bt_pair *p = &cell->search.pairs[cell->search.n_pairs++];
         *p = (bt_pair){
-            .a = a, .b = b, .axis = -1, .n_points = memory[k].n_points, .reach = -INFINITY, .lt = memory[k].value[2]};
+            .a = a, .b = b, .axis = -1, .n_points = (int16_t)memory[k].n_points, .reach = -INFINITY,
+            .lt = memory[k].value[2]};
         memcpy(p->part, memory[k].part, sizeof p->part);
         memcpy(p->feature, memory[k].feature, sizeof p->feature);
         memcpy(p->ln, memory[k].value, sizeof p->ln);

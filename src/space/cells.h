@@ -48,13 +48,14 @@ enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
 typedef struct bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
     uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
-    int32_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
-    int32_t n_points;    ///< contact points in the last solution
+    int16_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
+    int16_t n_points;    ///< contact points in the last solution
     uint32_t feature[2]; ///< of those
     double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
     /// gap when last computed + path lengths of a and b then: no contact while paths + margin < reach
     double reach;
 } bt_pair;
+_Static_assert(sizeof(bt_pair) == 56, "a floe in dense ice has three, and each is kept from step to step");
 
 /// One manifold, in three cache lines: what batches are packed from (solve/batch.h); in the last cell and under rising
 /// bounds a sweep reads it itself, and writes the last line. Its two points are on a line along the tangent, so both
@@ -71,16 +72,15 @@ typedef struct bt_contact {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
-    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
+    int32_t n;             ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
+    bt_idx pair;           ///< its pair in the cell
 } bt_contact;
 _Static_assert(sizeof(bt_contact) == 192, "three cache lines");
 
 /// What the sweep does not see of it.
 typedef struct bt_gaps {
-    double gap[2];         ///< m
-    double after[2];       ///< gaps that U2 leaves at the end of the step, m
+    double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
     double multiplier[2];  ///< multipliers of the position projection, kg m
-    int32_t pair;          ///< its pair in the cell
 } bt_gaps;
 
 /// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).

@@ -19,6 +19,7 @@
 #include "partition/domain.h"
 #include "base/fileio.h"
 #include "fuzz.h"
+#include "snapshot_file.h"
 #include "run/run_parts.h"
 
 static const struct { const char *text; int64_t steps;
@@ -289,7 +290,7 @@ static bool take_up_file(const kept_run *r, const bt_snapshot *s)
          *result = bt_file_join(r->dir, "result.h5");
     unlink(before);
     must(bt_file_copy(r->result, result, &err), &err);
-    must(bt_snapshot_write(s, path, NULL, &err), &err);
+    must(write_snapshot(s, path, NULL, &err), &err);
     const bt_status status = bt_run_resume(
         &bt_comm_alone,
         &(bt_run_options){.dir = r->dir, .threads = 1, .max_steps = STEPS, .quiet = true, .dump_step = -1}, &err);

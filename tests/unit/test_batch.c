@@ -179,7 +179,7 @@ static void overlap(knot_of_floes *s, uint64_t *rng)
     for (bt_idx i = 0; i < CONTACTS; i++) {
         if (scene_uniform(rng) < 0.1) make_sheets(&s->contacts[i], s->inv, rng);
         for (int c = 0; c < s->contacts[i].n; c++) {
-            s->gaps[i].after[c] = any(rng);
+            s->gaps[i].gap[c] = any(rng);
             s->gaps[i].multiplier[c] = bt_max(0, any(rng));
         }
         for (int c = s->contacts[i].n; c < 3; c++) s->before[i][c] = 0;

@@ -27,6 +27,7 @@
 #include "step/window.h"
 #include "base/checksum.h"
 #include "base/snapshot.h"
+#include "snapshot_file.h"
 #include "output/checkpoint_names.h"
 #include "output/state.h"
 
@@ -209,7 +210,7 @@ static void save(const setting *t, const bt_world *w, bt_snapshot *s)
 {
     bt_errors err = {0};
     must(bt_state_save(w, &bt_comm_alone, s, &err), &err);
-    bt_state_save_field(&t->f, s);
+    must(bt_state_save_field(&t->f, w, &bt_comm_alone, s, &err), &err);
 }
 
 /// A world from a state, with the field that it holds.
@@ -324,7 +325,7 @@ static void a_file_gives_back_every_bit(void **state)
     bt_snapshot_add_text(&s, "b/text", "two\nlines \xc3\xa9");
     bt_snapshot_add_text(&s, "b/empty", "");
     bt_snapshot_add_int(&s, "c/count", INT64_MIN);
-    must(bt_checkpoint_write(&s, folder, BT_CHECKPOINT_FILE, &err), &err);
+    must(write_checkpoint(&s, folder, BT_CHECKPOINT_FILE, &err), &err);
     char *path, *said;
     must(bt_checkpoint_read(&back, folder, &path, &said, &err), &err);
     assert_null(said);
@@ -412,7 +413,7 @@ static void damage_is_refused(void **state)
     for (int n = 0; n < 20; n++) bt_world_step(w);
     bt_snapshot s = {0};
     save(&t, w, &s);
-    must(bt_checkpoint_write(&s, folder, BT_CHECKPOINT_FILE, &err), &err);
+    must(write_checkpoint(&s, folder, BT_CHECKPOINT_FILE, &err), &err);
     size_t n;
     char *path = strdup(in_folder("damaged.h5")), *bytes = slurp(in_folder(BT_CHECKPOINT_FILE), &n);
     assert_true(n > 20000);
@@ -444,7 +445,7 @@ static void damage_is_refused(void **state)
     bt_world_step(w);
     bt_snapshot later = {0};
     save(&t, w, &later);
-    must(bt_snapshot_write(&later, path, bt_checkpoint_meaning, &err), &err);
+    must(write_snapshot(&later, path, bt_checkpoint_meaning, &err), &err);
     size_t m;
     char *other = slurp(path, &m);
     assert_int_equal(m, n);

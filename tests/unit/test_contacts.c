@@ -109,7 +109,7 @@ static contact *contacts_of(const bt_world *w, bt_idx *n)
             assert_int_equal(bt_cells_of_pair(w, u->a, u->b), k);
             c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n,
                                   u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
-                                  t->search.pairs[t->gaps[j].pair].feature[0]};
+                                  t->search.pairs[t->contacts[j].pair].feature[0]};
         }
     }
     assert_int_equal(*n, w->cells->n_contacts);
@@ -278,7 +278,7 @@ static void edge_contact_keeps_its_features(void **state)
         const bt_idx k = bt_cells_of_pair(w, 0, 1);
         bt_contact *u = &w->cells->cell[k].contacts[0];
         const bt_gaps *g = &w->cells->cell[k].gaps[0];
-        bt_pair *pair = &w->cells->cell[k].search.pairs[g->pair];
+        bt_pair *pair = &w->cells->cell[k].search.pairs[u->pair];
         assert_int_equal(u->n, 2);
         CHECK_CLOSE(u->nx, 1, 0.02);
         if (s == 0) {

@@ -29,6 +29,7 @@
 #include "base/h5read.h"
 #include "base/checksum.h"
 #include "base/snapshot.h"
+#include "snapshot_file.h"
 #include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-state-XXXXXX";
@@ -156,7 +157,7 @@ static int make_states(void **state)
         for (int n = 0; n < 40; n++) bt_world_step(w);
         if (k == 0) bt_events_add(&w->events, 1, BT_EVENT_WAYPOINT, 1, 2); // one to change
         must(bt_state_save(w, &bt_comm_alone, &kept[k].state, &err), &err);
-        bt_state_save_field(&f, &kept[k].state);
+        must(bt_state_save_field(&f, w, &bt_comm_alone, &kept[k].state, &err), &err);
         bt_world_free(w);
         bt_roster_free(&roster);
         bt_field_free(&f);
@@ -319,7 +320,7 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
     bt_snapshot s = {0};
     bt_snapshot_add_int(&s, "world/step", 3);
     must(bt_file_make_dir(in_folder("empty"), &err), &err);
-    must(bt_snapshot_write(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
+    must(write_snapshot(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
     const double revision[] = {1e300, 1e300}; // a number where a text is expected
     bt_snapshot_add(&s, "about/revision", BT_ITEM_F64, 2, 1, revision);
     for (int k = 0; k < 2; k++) {
@@ -328,7 +329,7 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
         assert_int_equal(bt_run_resume(&bt_comm_alone, &o, &err), BT_ERR_CASE);
         assert_true(err.n == 1 && strstr(err.text[0], "is missing"));
         bt_errors_free(&err);
-        must(bt_snapshot_write(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
+        must(write_snapshot(&s, in_folder("empty/checkpoint.h5"), NULL, &err), &err);
     }
     bt_snapshot_free(&s);
 }
