@@ -8,6 +8,7 @@
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
 #include "output/observe.h"
+#include "base/inside.h"
 #include "output/force_quantities.h"
 
 #include <math.h>
@@ -213,19 +214,7 @@ static void observe_rows(const bt_world *w, unsigned has, bt_sample *s)
 
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
 {
-    const bt_step_stats *st = &w->stats;
-    *s = (bt_sample){
-        .time = (double)w->step * w->par.dt,
-        .crushing = (double)st->n_crushing,
-        .crushed_work = st->crushed_work,
-        .crushed_depth = st->crushed_depth,
-        .rafting = (double)st->n_rafting,
-        .rafted_area = st->rafted_area,
-        .rafted_largest = st->rafted_largest,
-        .rafted_energy = st->rafted_energy,
-        .raft_edge_work = st->raft_edge_work,
-        .raft_friction_work = st->raft_friction_work,
-    };
+    *s = (bt_sample){.time = (double)w->step * w->par.dt};
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_cells(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);

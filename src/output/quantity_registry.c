@@ -32,8 +32,8 @@ const bt_quantity *bt_registered(int k) { return &added[k]; }
 
 static bool is_taken(const char *name)
 {
-    for (int k = 0; k < bt_n_own_series; k++)
-        if (!strcmp(bt_own_series[k].name, name)) return true;
+    for (int k = 0; k < bt_n_program_series(); k++)
+        if (!strcmp(bt_series(k)->name, name)) return true;
     for (int k = 0; k < n_added; k++)
         if (!strcmp(added[k].name, name)) return true;
     return false;

@@ -150,26 +150,7 @@ const bt_quantity bt_own_series[] = {
         "largest force of a floe on the towed body that is no collision, impulse / dt; NaN if not told apart",
         NONE, NULL, "impacts.largest_push_n"),
     ROW(moving, ALWAYS, LAST, "1", "floes faster than 1 % of the reference speed"),
-    SHOWN(crushing, ALWAYS, MEAN, "1",
-        "contact points that crush: their normal force is at the limit pressure x thickness x length",
-        NONE, NULL, "max_crushing_contacts"),
-    SHOWN(crushed_work, ALWAYS, SUM, "J", "work taken by contact points that crush", NONE, NULL, "crushed_work_j"),
-    SHOWN(crushed_depth, ALWAYS, MAX, "m",
-        "deepest crush of a pair of bodies in contact, or at rest beside each other",
-        NONE, NULL, "max_crushed_depth_m"),
-    SHOWN(rafting, ALWAYS, LAST, "1", "pairs of floes that lie over each other", NONE, NULL, "rafting_pairs"),
-    SHOWN(rafted_area, ALWAYS, LAST, "m2",
-        "area in which floes lie over each other, pair by pair, at the start of the step",
-        NONE, NULL, "rafted_area_m2"),
-    SHOWN(rafted_largest, ALWAYS, MAX, "m2", "the largest such area of one pair", NONE, NULL, "largest_rafted_pair_m2"),
-    SHOWN(rafted_energy, ALWAYS, LAST, "J",
-        "potential energy of floes that lie over each other, above that of floes side by side",
-        NONE, NULL, "rafted_energy_j"),
-    SHOWN(raft_edge_work, ALWAYS, SUM, "J",
-        "work taken by edges that raft: their load is at the bound; part of it is in rafted_energy, the rest is lost",
-        NONE, NULL, "raft_edge_work_j"),
-    SHOWN(raft_friction_work, ALWAYS, SUM, "J",
-        "work taken by friction between floes that lie over each other", NONE, NULL, "raft_friction_work_j"),
+    // here those of the contact laws: src/contact/crush.c, raft.c
     SHOWN(window_x, WINDOW, LAST, "m",
         "low end of the moving window, not wrapped; NaN where the domain stands still",
         NONE, NULL, "moving_window.x_m"),
@@ -183,7 +164,7 @@ const bt_quantity bt_own_series[] = {
 
 const int bt_n_own_series = sizeof bt_own_series / sizeof *bt_own_series;
 
-_Static_assert(sizeof bt_own_series / sizeof *bt_own_series == offsetof(bt_sample, added) / sizeof(double),
+_Static_assert(sizeof bt_own_series / sizeof *bt_own_series == offsetof(bt_sample, laws) / sizeof(double),
                "every number of a sample has its row in the table");
 _Static_assert(sizeof bt_own_series / sizeof *bt_own_series <= BT_COST_SERIES + 8,
                "what check says of the disk counts them");
