@@ -71,10 +71,7 @@ void bt_added_bound(const bt_world *w, int law, bt_cell *t, bt_idx j, const bt_p
 
 // --- after the solve -------------------------------------------------------------------------------------------------
 
-static int first_sum(int law)
-{
-    return bt_law_first_number(BT_LAWS) + (law - BT_LAWS) * (1 + BT_MAX_CONTACT_NUMBERS);
-}
+static int first_sum(int law) { return (law - BT_LAWS) * (1 + BT_MAX_CONTACT_NUMBERS); }
 
 void bt_added_give_way(const bt_world *w, int law, const bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {

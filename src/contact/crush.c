@@ -9,8 +9,9 @@
 #include "contact/row.h"
 #include "contact/work.h"
 
-#define LEAST_WAY 0.01   // of the mean floe size: the contact length is linear over the approach of the step, or over this
-#define MOST_DEPTH 0.3   // of the mean floe size: beyond, outlines that stay as they were are no model
+// Of the mean floe size: the contact length is linear over the approach of the step, or over this.
+#define LEAST_WAY 0.01
+#define MOST_DEPTH 0.3 // of the mean floe size: beyond, outlines that stay as they were are no model
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
 

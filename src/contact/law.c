@@ -109,8 +109,8 @@ double bt_laws_overlap(const bt_cell *t)
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-/// Sums of the numbers of a law.
-static bt_sum *sums_of(bt_totals *t, int law) { return t->sum + bt_law_first_number(law); }
+/// Sums of the numbers of a law; those of added laws come first.
+static bt_sum *sums_of(bt_totals *t, int law) { return t->sum + bt_added_sums() + bt_law_first_number(law); }
 
 static void into_stats(bt_step_stats *st, bt_totals *t, const double most[BT_LAWS])
 {
@@ -156,7 +156,8 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
     for (bt_idx j = 0; j < t->n_contacts; j++) {
         grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
-            if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law]->remember(w, t, j, sums_of(totals, law)));
+            if (bt_law_on(&w->par, law))
+                most[law] = bt_max(most[law], bt_laws[law]->remember(w, t, j, sums_of(totals, law)));
         for (int law = BT_LAWS; law < BT_ALL_LAWS; law++)
             if (bt_law_on(&w->par, law)) bt_added_remember(w, law, t, j, totals);
     }

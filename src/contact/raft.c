@@ -32,7 +32,8 @@ static const bt_law_number numbers[] = {
                        BT_KEEP_SUM, .key = "raft_friction_work_j"},
 };
 
-enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MOST_AREA, LARGEST_PAIR, ALL_ENERGY, ALL_EDGE_WORK, ALL_FRICTION_WORK };
+enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MOST_AREA, LARGEST_PAIR, ALL_ENERGY,
+       ALL_EDGE_WORK, ALL_FRICTION_WORK };
 static const bt_law_total totals[] = {
     [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", true, "rafting_pairs", "1",
                    "pairs of floes that lie over each other, at the end"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Series of contact laws: the numbers of the program's own (contact/law.h), and work and numbers of those that a program
-// has added (bergtow/contact.h).
+// Series of contact laws: the numbers of the program's own (contact/law.h), and work and numbers of those that a
+// program has added (bergtow/contact.h).
 #ifndef BERGTOW_CONTACT_QUANTITIES_H
 #define BERGTOW_CONTACT_QUANTITIES_H
 

@@ -7,18 +7,6 @@
 #include <string.h>
 
 #include "output/record.h"
-#include "tow/tow.h"
-
-double bt_force_against(const bt_world *w, int k)
-{
-    const bt_impulse *j = &w->forces->series[k];
-    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
-}
-
-double bt_force_of(const bt_world *w, const void *series)
-{
-    return bt_force_against(w, bt_force_series_find(series));
-}
 
 /// Is its force one of the program's own series?
 static bool has_series(const bt_force_series *of)

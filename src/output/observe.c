@@ -9,7 +9,6 @@
 // momentum that everything else has gained (ice_resistance_budget).
 #include "output/observe.h"
 #include "base/inside.h"
-#include "output/force_quantities.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -79,6 +79,12 @@ enum { BT_SERIES_AFTER_LAWS = 3 };
 /// How many series there are before the first that is registered.
 int bt_n_program_series(void);
 
+/// Force of series k (bt_force_series_of) on the towed body against the tow direction in the step just solved, N.
+double bt_force_against(const bt_world *w, int k);
+
+/// The same by the name of the series: of_world of a quantity whose context is that name.
+double bt_force_of(const bt_world *w, const void *series);
+
 /// A number of a sample by its quantity.
 static inline double bt_sample_value(const bt_sample *s, const bt_quantity *f)
 {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The program's own series: name, unit, meaning, when it applies, how steps merge, where it is shown and summed up.
 #include "output/record.h"
-#include "output/force_quantities.h"
 #include "case/cost.h"
+#include "tow/tow.h"
 
 #define PARTS(name_, applies_, keep_, units_, text_, role_, label_, key_)                                              \
     .name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_),                       \
@@ -28,6 +28,17 @@ static double at_place(const bt_world *w, const void *context)
     case NO_FLAG: return !*(const bool *)at;
     default: return *(const double *)at;
     }
+}
+
+double bt_force_against(const bt_world *w, int k)
+{
+    const bt_impulse *j = &w->forces->series[k];
+    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
+}
+
+double bt_force_of(const bt_world *w, const void *series)
+{
+    return bt_force_against(w, bt_force_series_find(series));
 }
 
 #define PLACE(at_, kind_) .of_world = at_place, .context = &(const place){offsetof(bt_world, at_), kind_}

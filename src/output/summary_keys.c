@@ -356,7 +356,8 @@ static const bt_json_key rows[] = {
     OF_SUMMARY("contacts_mean", contacts, "1", "contact points, mean over all steps"),
     OF_HISTORY("contact_work_j", contact_work, "J", "work of the contact impulses"),
     {.kind = BT_JSON_LAWS}, // the totals of the contact laws: src/contact/crush.c, raft.c
-    NUMBER("rafted_share_of_ice", rafted_share, "1", "area in which floes lie over each other at the end, over the area of all ice"),
+    NUMBER("rafted_share_of_ice", rafted_share, "1",
+        "area in which floes lie over each other at the end, over the area of all ice"),
     OF_TOTALS("stalled_s", stall.time, "s", "time in which the body stood still while the tow asked for motion"),
     OF_TOTALS("stalled_windows", stall.windows, "1", "stretches of time in which it did"),
     OF_HISTORY("positive_work_steps", positive_work, "1", "steps in which the contacts added energy"),

@@ -93,7 +93,8 @@ static void the_weaker_law_yields(void **state)
     (void)state;
     for (int i = 0; i < 2; i++) {
         bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
-        w->par.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = i ? 5e6 : 300, w->par.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0.01;
+        double *own = w->par.law_own[BT_LAW_CRUSHING];
+        own[BT_CRUSH_PRESSURE] = i ? 5e6 : 300, own[BT_CRUSH_LEAST] = 0.01;
         double crushed = 0;
         for (int s = 0; s < 1000; s++) {
             bt_world_step(w);

@@ -168,7 +168,8 @@ static void corner(void **state)
                 depth = bt_max(depth, scene_law(w, "crushed_depth")); // of pairs in contact: none where all rests
                 if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
                 if (s == 1) { // takes from the floe the energy that this depth costs
-                    CHECK_CLOSE(scene_law(w, "crushed_work"), 0.5 * k * pow(scene_law(w, "crushed_depth"), 2), 1e-8 * m * v * v);
+                    CHECK_CLOSE(scene_law(w, "crushed_work"), 0.5 * k * pow(scene_law(w, "crushed_depth"), 2),
+                                1e-8 * m * v * v);
                     CHECK_CLOSE(scene_law(w, "crushed_depth"), v * dt / sqrt(1 + dt * dt * k / m), 1e-9);
                 }
             }
@@ -333,7 +334,8 @@ static void laws_of_a_jam(void **state)
     const double h = 0.1, speed = 0.5;
     bt_params p = params(0.01);
     p.max_sweeps = 1; // far off, up to three times that
-    p.law_own[BT_LAW_RAFTING][BT_RAFT_LINE] = 2 * pressure / h, p.law_own[BT_LAW_RAFTING][BT_RAFT_SHEET] = 1e3, p.law_own[BT_LAW_RAFTING][BT_RAFT_RISE] = 1e3;
+    double *own = p.law_own[BT_LAW_RAFTING];
+    own[BT_RAFT_LINE] = 2 * pressure / h, own[BT_RAFT_SHEET] = own[BT_RAFT_RISE] = 1e3;
     bt_world *w = bt_world_create(&p);
     uint64_t seed = 1;
     for (int k = 0; k < 64; k++) {

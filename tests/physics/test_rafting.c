@@ -20,7 +20,8 @@ static bt_params params(double dt)
     bt_params p = scene_params(dt, 10);
     p.slop = 0.01;
     p.tolerance = 1e-8;
-    p.law_own[BT_LAW_RAFTING][BT_RAFT_LINE] = kappa * 0.5 * rise(), p.law_own[BT_LAW_RAFTING][BT_RAFT_RISE] = rise(), p.law_own[BT_LAW_RAFTING][BT_RAFT_SHEET] = (water - ice) * gravity;
+    double *own = p.law_own[BT_LAW_RAFTING];
+    own[BT_RAFT_LINE] = kappa * 0.5 * rise(), own[BT_RAFT_RISE] = rise(), own[BT_RAFT_SHEET] = (water - ice) * gravity;
     return p;
 }
 
@@ -269,7 +270,8 @@ static void plough_in_a_channel(void **state)
     CHECK_CLOSE(edge + friction, work, 0.02 * work);
     CHECK_CLOSE(scene_law(w, "rafted_area"), width * way, 0.02 * width * way);
     CHECK_CLOSE(edge, edge_load() * width * way, 0.03 * edge);
-    CHECK_CLOSE(scene_law(w, "rafted_energy"), rise() * h * h * scene_law(w, "rafted_area"), 1e-9 * scene_law(w, "rafted_energy"));
+    CHECK_CLOSE(scene_law(w, "rafted_energy"), rise() * h * h * scene_law(w, "rafted_area"),
+                1e-9 * scene_law(w, "rafted_energy"));
     bt_world_free(w);
 }
 
@@ -296,7 +298,8 @@ static void energy_is_booked(void **state)
             bt_world_step(w);
             check_step(w);
             if (s == 0) before = w->stats.kinetic_energy - w->stats.contact_work;
-            all += w->stats.contact_work, edge += scene_law(w, "raft_edge_work"), friction += scene_law(w, "raft_friction_work");
+            all += w->stats.contact_work, edge += scene_law(w, "raft_edge_work");
+            friction += scene_law(w, "raft_friction_work");
             CHECK_CLOSE(w->stats.kinetic_energy, before + all, 1e-6 * before);
             assert_true(w->stats.overlap < 0.05);
         }

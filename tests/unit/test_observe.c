@@ -73,7 +73,8 @@ static void sheets_are_no_contact(void **state)
     (void)state;
     bt_params p = scene_params(0.1, 10);
     p.slop = 0.01;
-    p.law_own[BT_LAW_RAFTING][BT_RAFT_LINE] = 4e3, p.law_own[BT_LAW_RAFTING][BT_RAFT_RISE] = 1e3, p.law_own[BT_LAW_RAFTING][BT_RAFT_SHEET] = 1e3;
+    double *own = p.law_own[BT_LAW_RAFTING];
+    own[BT_RAFT_LINE] = 4e3, own[BT_RAFT_RISE] = own[BT_RAFT_SHEET] = 1e3;
     bt_world *w = bt_world_create(&p);
     double v[8];
     for (int k = 0; k < 2; k++) {
