@@ -84,9 +84,9 @@ static inline bt_sample sample(int step)
     s.momentum_residual = 1e-15;
     s.kinetic_energy = 100;
     s.contact_work = -2;
-    s.crushing = step % 4 == 0 ? 3 : 0;
-    s.crushed_work = step % 4 == 0 ? 1.5 : 0;
-    s.crushed_depth = 0.01;
+    bt_sample_set(&s, bt_series_find("crushing"), step % 4 == 0 ? 3 : 0);
+    bt_sample_set(&s, bt_series_find("crushed_work"), step % 4 == 0 ? 1.5 : 0);
+    bt_sample_set(&s, bt_series_find("crushed_depth"), 0.01);
     s.repeats = s.outrun = s.restitution_cut = 0;
     return s;
 }

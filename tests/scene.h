@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "contact/contacts.h"
+#include "law_number.h"
 #include "space/cells.h"
 #include "bergtow/forces.h"
 #include "bergtow/shape.h"

@@ -3,7 +3,7 @@
 #ifndef BERGTOW_TEST_SNAPSHOT_FILE_H
 #define BERGTOW_TEST_SNAPSHOT_FILE_H
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "base/snapshot.h"
 
 static inline void add_items(bt_snapshot *to, const bt_snapshot *s)

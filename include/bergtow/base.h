@@ -43,9 +43,6 @@ void bt_errors_free(bt_errors *e);
 /// All messages of `from` behind those of `to`; from is empty then.
 void bt_errors_move(bt_errors *to, bt_errors *from);
 
-/// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
-void bt_leave_by(void (*by)(int code));
-
 /// malloc/realloc/calloc that end the program with a message and BT_ERR_NUMERIC when memory runs out.
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size
@@ -80,14 +77,6 @@ double bt_clock(void);
 static inline double bt_min(double a, double b) { return a < b ? a : b; }
 /// See bt_min.
 static inline double bt_max(double a, double b) { return a > b ? a : b; }
-
-/// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
-/// parallel loop.
-#ifdef BT_VALIDATE
-#define BT_MANY(n, few) ((n) >= 0 && (few) >= 0)
-#else
-#define BT_MANY(n, few) ((n) > (few))
-#endif
 
 #define BT_PI 3.14159265358979323846
 

@@ -81,12 +81,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
 /// NULL; *code: the first line.
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
 
-struct bt_member_records;
-
-/// Make DIR/ensemble.h5 from the files of the members that are sound by these records (src/run/ensemble_record.h); the
-/// caller holds DIR/lock. Errors: BT_ERR_IO.
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, struct bt_member_records *records, bt_errors *err);
-
 #ifdef __cplusplus
 }
 #endif

@@ -205,37 +205,12 @@ typedef struct bt_forces {
     bt_impulse series[BT_MAX_FORCE_SERIES];
 } bt_forces;
 
-/// For a world that begins: the force laws that there are now, all their numbers 0.
-bt_forces *bt_forces_create(void);
-/// Release them; NULL is ignored.
-void bt_forces_free(bt_forces *f);
-
-/// The numbers of all laws from a case. Without a case a program sets w->forces->own itself; they are 0 before.
-void bt_forces_setup(bt_world *w, const bt_case *c);
-
-/// Collective. At the start of a step, before bt_forces_predict: `begin` of the laws that have one.
-void bt_forces_begin(bt_world *w);
-
-/// Fill vel_start (U1), vel and vel_free (U*) and inv (effective) of every dynamic body. Kinematic and static bodies
-/// keep vel.
-void bt_forces_predict(bt_world *w);
-
-/// After the solve, before bodies move: w->forces->law and ->series of the towed body.
-void bt_forces_record(bt_world *w);
-
 /// The impulses on body i in the step just solved, before it has moved, as in bt_forces; of a kinematic body the forces
 /// at its prescribed velocity. law: [BT_MAX_FORCE_LAWS]; series: [BT_MAX_FORCE_SERIES].
 void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse *series);
 
-/// May floes that drift with the water rest: bt_force_law.rests of all laws.
-bool bt_forces_rest(const bt_world *w);
-
 /// All that acts on body i at velocity u.
 void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
-
-/// Velocity after a step of the free drift of a body without outline, whose form drag is part of its skin drag.
-/// b: par, time and towed_at are set here.
-bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
 
 /// Drag of one body from the moments of its outline, multiplied out: the products of bt_drag (world.h). draft, sail: m;
 /// densities: kg/m³; coefficients of form and skin drag: 1 (bt_drag_coefs).

@@ -35,9 +35,9 @@ typedef struct bt_run_options {
 /// as stopped, and can be taken up again). The case is the same on all ranks.
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err);
 
-/// Collective. Go on with the run in o->dir from its last checkpoint (bergtow/checkpoint.h), or from its case if it was
-/// killed before the first. That a run is finished is said. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is
-/// refused.
+/// Collective. Go on with the run in o->dir from its last checkpoint (src/output/checkpoint.h), or from its case if it
+/// was killed before the first. That a run is finished is said. Errors as bt_run, and BT_ERR_CASE for a checkpoint that
+/// is refused.
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
 
 /// Collective. OpenMP threads of this rank of comm: as asked (0 = not), else run.threads of the case, else

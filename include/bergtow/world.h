@@ -117,8 +117,11 @@ typedef struct bt_bodies {
     bt_gid n_global;
 } bt_bodies;
 
-/// Contact laws beside the program's own, and what one may have (contact.h).
-enum { BT_MAX_ADDED_LAWS = 3, BT_MAX_CONTACT_OWN = 8, BT_MAX_CONTACT_NUMBERS = 4 };
+/// Contact laws, those beside the program's own, and what one of these may have (contact.h); numbers that the program's
+/// own may form.
+enum {
+    BT_MAX_LAWS = 8, BT_MAX_ADDED_LAWS = 3, BT_MAX_CONTACT_OWN = 8, BT_MAX_CONTACT_NUMBERS = 4, BT_MAX_LAW_NUMBERS = 12
+};
 
 /// Constants of the step.
 typedef struct bt_params {
@@ -137,12 +140,7 @@ typedef struct bt_params {
     int64_t position_sweeps; ///< limit of the position projection: updates of every contact; with plain_sweeps, sweeps
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets cells and skin, m
-    double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
-    double crush_least;    ///< least length of a contact / ice thickness
-    double raft_line;      ///< line load under which floes raft / thickness², Pa/m; 0 = they do not (raft.h)
-    double raft_sheet;     ///< pressure between sheets on each other / thickness, Pa/m
-    double raft_rise;      ///< potential energy of sheets on each other / (area × both thicknesses), Pa/m
-    double added_own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN]; ///< numbers of contact laws that were added (contact.h)
+    double law_own[BT_MAX_LAWS][BT_MAX_CONTACT_OWN]; ///< numbers of each contact law; units as it says
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -198,15 +196,8 @@ typedef struct bt_step_stats {
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
-    double crushed_work;     ///< taken by contact points that crush, J
-    int64_t n_crushing;      ///< contact points that crush
-    double crushed_depth;    ///< deepest crush of a pair in contact, at the end, m
-    int64_t n_rafting;       ///< pairs of floes that lie over each other (raft.h)
-    double rafted_area;      ///< of theirs that overlaps, at the start, m²
-    double rafted_largest;   ///< the largest of one pair, m²
-    double rafted_energy;    ///< potential energy of the sheets on each other, J
-    double raft_edge_work;   ///< taken by edges at their bound, J
-    double raft_friction_work; ///< taken by friction between sheets, J
+    /// numbers of the program's contact laws, in their order (src/contact/law.h): series, with units and meaning there
+    double laws[BT_MAX_LAW_NUMBERS];
     double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of laws that were added
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J

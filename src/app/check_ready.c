@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "bergtow/comm.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "bergtow/world.h"
 #include "case/arch.h"
 #include "case/case_check.h"

@@ -7,7 +7,7 @@
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "case/rope.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "bergtow/shape.h"
 #include "case/arch.h"
 #include "case/case_check.h"
@@ -15,6 +15,7 @@
 #include "app/cmd.h"
 #include "app/cmd_check.h"
 #include "case/cost.h"
+#include "contact/law.h"
 #include "estimate/packing.h"
 #include "base/elementary.h"
 
@@ -162,26 +163,14 @@ static void print_body(const bt_case *c)
     if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c);
 }
 
-/// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.
-static void print_crushing(const bt_case *c, const bt_check_ice *n)
+/// What the contact laws of the case mean for the mean floe.
+static void print_laws(const bt_case *c, const bt_check_ice *n)
 {
-    if (!(c->ice.crushing_pressure > 0) || n->count < 1) return;
-    const double line = c->ice.crushing_pressure * n->thickness;
-    printf(
-        "crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n",
-        line, line * c->ice.crushing_least * n->thickness, line * n->size);
-}
-
-/// Load under which an edge of the mean floe rafts, and the friction of sheets on each other.
-static void print_rafting(const bt_case *c, const bt_check_ice *n)
-{
-    if (!(c->ice.rafting_kappa > 0) || n->count < 1) return;
-    const double h = n->thickness,
-                 line = 0.5 * c->ice.rafting_kappa * bt_case_rise(c->ice.density, c->water.density) * h * h;
-    printf("rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an "
-           "edge of a mean floe's width rafts at %.4g N\n",
-           line, c->ice.rafting_kappa, c->ice.friction * (c->water.density - c->ice.density) * BT_GRAVITY * h,
-           line * n->size);
+    for (int law = 0; n->count >= 1 && law < BT_LAWS; law++) {
+        char *line = bt_laws[law]->check ? bt_laws[law]->check(c, n->thickness, n->size) : NULL;
+        if (line) fputs(line, stdout);
+        free(line);
+    }
 }
 
 static void print_window(const bt_case *c)
@@ -315,8 +304,7 @@ static void print_text(const char *path, const bt_case *c, const bt_field *f, co
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, n);
-    print_crushing(c, n);
-    print_rafting(c, n);
+    print_laws(c, n);
     print_outlines(&f->outlines, c);
     print_body(c);
     print_width(c, n);

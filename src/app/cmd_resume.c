@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // bergtow resume: go on with a run from its last checkpoint. bergtow diff: compare two checkpoints.
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // bergtow run: a case to a result folder.
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Messages, memory and the clock.
 #include "bergtow/base.h"
+#include "base/inside.h"
 
 #include <stdio.h>
 #include <stdlib.h>

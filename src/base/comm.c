@@ -6,6 +6,7 @@
 // combined one by one, so that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one
 // message.
 #include "bergtow/comm.h"
+#include "base/inside.h"
 
 #include <ctype.h>
 #include <signal.h>

@@ -2,7 +2,7 @@
 // A snapshot as an HDF5 file: a dataset for each array, /group/name. What lies in the root group are dimensions: they
 // hold no number, and are passed over when the file is read.
 //
-// Written to the name it is given, not to a temporary one: that is the caller's part (bergtow/checkpoint.h).
+// Written to the name it is given, not to a temporary one: that is the caller's part (output/checkpoint.h).
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -31,7 +31,7 @@ void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTA
 
 // --- a contact as the law sees it ------------------------------------------------------------------------------------
 
-static const double *own_of(const bt_params *p, int law) { return p->added_own[law - BT_LAWS]; }
+static const double *own_of(const bt_params *p, int law) { return p->law_own[law]; }
 
 bool bt_added_on(const bt_params *p, int law)
 {
@@ -71,7 +71,7 @@ void bt_added_bound(const bt_world *w, int law, bt_cell *t, bt_idx j, const bt_p
 
 // --- after the solve -------------------------------------------------------------------------------------------------
 
-static int first_sum(int law) { return BT_LAW_SUMS + (law - BT_LAWS) * (1 + BT_MAX_CONTACT_NUMBERS); }
+static int first_sum(int law) { return (law - BT_LAWS) * (1 + BT_MAX_CONTACT_NUMBERS); }
 
 void bt_added_give_way(const bt_world *w, int law, const bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {

@@ -35,7 +35,7 @@ void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_tota
 /// A record into the numbers that are a state.
 void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
 
-/// How many sums they have, from BT_LAW_SUMS on.
+/// How many sums they have, before those of the program's own laws.
 int bt_added_sums(void);
 
 /// Their sums into the numbers of the step.

@@ -9,10 +9,70 @@
 #include "contact/row.h"
 #include "contact/work.h"
 
-#define LEAST_WAY                                                                                                      \
-    0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
+// Of the mean floe size: the contact length is linear over the approach of the step, or over this.
+#define LEAST_WAY 0.01
+#define MOST_DEPTH 0.3 // of the mean floe size: beyond, outlines that stay as they were are no model
 
-bool bt_crush_on(const bt_params *p) { return p->crush_pressure > 0; }
+// --- numbers ---------------------------------------------------------------------------------------------------------
+
+enum { CRUSHING, CRUSHED_WORK, CRUSHED_DEPTH };
+static const bt_law_number numbers[] = {
+    [CRUSHING] = {"crushing", "1",
+                  "contact points that crush: their normal force is at the limit pressure x thickness x length",
+                  BT_KEEP_MEAN, .key = "max_crushing_contacts"},
+    [CRUSHED_WORK] = {"crushed_work", "J", "work taken by contact points that crush", BT_KEEP_SUM,
+                      .key = "crushed_work_j"},
+    [CRUSHED_DEPTH] = {"crushed_depth", "m",
+                       "deepest crush of a pair of bodies in contact, or at rest beside each other", BT_KEEP_MAX,
+                       .largest = true, .key = "max_crushed_depth_m"},
+};
+
+enum { WORK, DEPTH, STEPS, MOST };
+static const bt_law_total totals[] = {
+    [WORK] = {CRUSHED_WORK, BT_TOTAL_SUM, "crushed_work", .key = "crushed_work_j", .units = "J",
+              .description = "work taken by contact points that crush"},
+    [DEPTH] = {CRUSHED_DEPTH, BT_TOTAL_MAX, "max_crushed_depth", .key = "max_crushed_depth_m", .units = "m",
+               .description = "deepest crush of a pair of bodies"},
+    [STEPS] = {CRUSHING, BT_TOTAL_STEPS, "crushing_steps", .key = "crushing_steps", .units = "1",
+               .description = "steps with contact points that crush"},
+    [MOST] = {CRUSHING, BT_TOTAL_MAX, "max_crushing", .key = "max_crushing_contacts", .units = "1",
+              .description = "most of them at once"},
+};
+
+static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
+{
+    own[BT_CRUSH_PRESSURE] = c->ice.crushing_pressure;
+    own[BT_CRUSH_LEAST] = c->ice.crushing_least;
+}
+
+static bool on(const double *own) { return own[BT_CRUSH_PRESSURE] > 0; }
+
+static char *check(const bt_case *c, double thickness, double size)
+{
+    if (!(c->ice.crushing_pressure > 0)) return NULL;
+    const double line = c->ice.crushing_pressure * thickness;
+    return bt_text_of(
+        "crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n",
+        line, line * c->ice.crushing_least * thickness, line * size);
+}
+
+static char *result(const bt_case *c, const bt_total_value *total, double ice_area)
+{
+    (void)ice_area;
+    if (!(c->ice.crushing_pressure > 0)) return NULL;
+    return bt_text_of(
+        "  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n",
+        total[WORK].real, (long long)total[STEPS].whole, total[MOST].real, total[DEPTH].real);
+}
+
+static char *doubt(const bt_total_value *total, double size)
+{
+    const double depth = total[DEPTH].real;
+    if (depth <= MOST_DEPTH * size) return NULL;
+    return bt_text_of("floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses "
+                      "stay as they were, which is no model of that",
+                      depth, 100 * depth / size);
+}
 
 /// Thickness that is crushed when a and b are pressed together, m; 0 = neither is ice.
 static double thickness_of(const bt_bodies *s, bt_idx a, bt_idx b)
@@ -21,17 +81,17 @@ static double thickness_of(const bt_bodies *s, bt_idx a, bt_idx b)
     return ha > 0 && hb > 0 ? bt_min(ha, hb) : bt_max(ha, hb);
 }
 
-bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_of(&w->bodies, a, b) > 0; }
+static bool applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_of(&w->bodies, a, b) > 0; }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-bool bt_crush_keeps(const bt_world *w, bt_memory *r) { return bt_law_near(w, r); }
+static bool keeps(const bt_world *w, bt_memory *r) { return bt_law_near(w, r); }
 
 static double depth_of(const bt_memory *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
 
-double bt_crush_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
+static double count(const bt_world *w, const bt_memory *r, bt_sum *number)
 {
-    (void)w, (void)totals;
+    (void)w, (void)number;
     return depth_of(r);
 }
 
@@ -97,13 +157,13 @@ static double share_of(const bt_manifold *m, int i, patch c)
     return i ? second : 1 - second;
 }
 
-void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     const bt_bodies *s = &w->bodies;
     const bt_contact *u = &t->contacts[j];
     bt_gaps *g = &t->gaps[j];
     bt_limit *l = &t->laws.limits[j];
-    const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
+    const double h = thickness_of(s, m->a, m->b), dt = w->par.dt, *own = w->par.law_own[BT_LAW_CRUSHING];
     const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
     const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
@@ -115,7 +175,7 @@ void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, c
         const double before = bt_normal_velocity(u, i, &s->vel_start[m->a], &s->vel_start[m->b]);
         approach = bt_max(approach, -bt_min(before, bt_normal_velocity(u, i, &s->vel_free[m->a], &s->vel_free[m->b])));
     }
-    const double per_length = w->par.crush_pressure * h * dt, least = w->par.crush_least * h / m->n_points;
+    const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / m->n_points;
     const double way = bt_max(dt * approach - gap, LEAST_WAY * w->par.size);
     const patch now = patch_of(w, p->part, m, gap + w->par.slop),
                 then = patch_of(w, p->part, m, gap + w->par.slop + way);
@@ -125,7 +185,7 @@ void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, c
         l->flat[i] = bt_min(l->flat[i], per_length * bt_max(length, least));
         l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
         if (later <= bt_max(length, least)) continue; // as long as it gets
-        const double k = w->par.crush_pressure * h * (later - length) / way;
+        const double k = own[BT_CRUSH_PRESSURE] * h * (later - length) / way;
         l->base[i] = bt_min(l->flat[i], per_length * length);
         l->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * u->w[i]));
     }
@@ -133,18 +193,18 @@ void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, c
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-bool bt_crush_gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->flat[i]; }
+static bool gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->flat[i]; }
 
-void bt_crush_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
+static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 {
     t->laws.limits[j].depth[i] += t->laws.limits[j].grown[i];
-    bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
-    bt_sum_add(&totals->sum[BT_CRUSHING_POINTS], 1);
+    bt_sum_add(&number[CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
+    bt_sum_add(&number[CRUSHING], 1);
 }
 
-double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
+static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
-    (void)totals;
+    (void)number;
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
     double deepest = 0;
@@ -157,3 +217,23 @@ double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     bt_law_put(t, l->record[BT_LAW_CRUSHING], &r);
     return deepest;
 }
+
+const bt_law bt_crush_law = {.name = "crushing",
+                             .keys = "ice.crushing",
+                             .what = "ice bears a pressure, and what cannot be borne is crushed",
+                             .setup = setup,
+                             .on = on,
+                             .numbers = numbers,
+                             .n_numbers = sizeof numbers / sizeof *numbers,
+                             .totals = totals,
+                             .n_totals = sizeof totals / sizeof *totals,
+                             .applies = applies,
+                             .bound = bound,
+                             .keeps = keeps,
+                             .gives_way = gives_way,
+                             .give_way = give_way,
+                             .remember = remember,
+                             .count = count,
+                             .check = check,
+                             .result = result,
+                             .doubt = doubt};

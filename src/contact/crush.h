@@ -44,14 +44,10 @@
 
 #include "contact/law.h"
 
-// The crushing law's row in the table (contact/law.h). Its record: a depth for each contact feature, m.
-bool bt_crush_on(const bt_params *p);
-bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b);
-void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-bool bt_crush_keeps(const bt_world *w, bt_memory *r);
-bool bt_crush_gives_way(const bt_contact *u, const bt_limit *l, int i);
-void bt_crush_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals);
-double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals);
-double bt_crush_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
+/// Its record: a depth for each contact feature, m.
+extern const bt_law bt_crush_law;
+
+/// Its numbers of the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.
+enum { BT_CRUSH_PRESSURE, BT_CRUSH_LEAST };
 
 #endif

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
+#include "base/inside.h"
 #include "contact/law.h"
 #include "space/cells.h"
 #include "tow/tow.h"
@@ -134,14 +135,14 @@ static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
 {
     const size_t n = s->n;
     for (int law = 0; law < BT_LAWS; law++) {
-        if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
+        if (!bt_laws[law]->contact || !bt_law_on(&w->par, law)) continue;
         for (size_t k = 0; k < n; k++) {
             bt_pair *p = &t->search.pairs[s->pair[k]];
             const bt_memory names = bt_law_names(w, p, law);
             const bt_idx at = bt_law_find(t, &names);
             if (at < 0) continue;
             bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
-            if (bt_laws[law].contact(w, p, &t->laws.memory[at], &edge, sheets)) {
+            if (bt_laws[law]->contact(w, p, &t->laws.memory[at], &edge, sheets)) {
                 s->man[k] = edge;
                 bt_pack_keep(s);
             } else {

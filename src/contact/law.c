@@ -11,42 +11,43 @@
 #include "partition/domain.h"
 #include "contact/row.h"
 
-const bt_law bt_laws[BT_LAWS] = {
-    [BT_LAW_RIGID] = {.name = "rigid", .what = "a contact bears any load"},
-    [BT_LAW_CRUSHING] = {.name = "crushing",
-                         .keys = "ice.crushing",
-                         .on = bt_crush_on,
-                         .what = "ice bears a pressure, and what cannot be borne is crushed",
-                         .applies = bt_crush_applies,
-                         .bound = bt_crush_bound,
-                         .keeps = bt_crush_keeps,
-                         .gives_way = bt_crush_gives_way,
-                         .give_way = bt_crush_give_way,
-                         .remember = bt_crush_remember,
-                         .count = bt_crush_count},
-    [BT_LAW_RAFTING] = {.name = "rafting",
-                        .keys = "ice.rafting",
-                        .on = bt_raft_on,
-                        .what =
-                            "edges bear a line load, and floes that are pressed together harder slide over each other",
-                        .applies = bt_raft_applies,
-                        .contact = bt_raft_contact,
-                        .bound = bt_raft_bound,
-                        .keeps = bt_raft_keeps,
-                        .gives_way = bt_raft_gives_way,
-                        .give_way = bt_raft_give_way,
-                        .remember = bt_raft_remember,
-                        .count = bt_raft_count},
+static const bt_law rigid = {.name = "rigid", .what = "a contact bears any load"};
+
+const bt_law *const bt_laws[BT_LAWS] = {
+    [BT_LAW_RIGID] = &rigid,
+    [BT_LAW_CRUSHING] = &bt_crush_law,
+    [BT_LAW_RAFTING] = &bt_raft_law,
 };
+
+int bt_law_first_number(int law)
+{
+    int n = 0;
+    while (law > 0) n += bt_laws[--law]->n_numbers;
+    return n;
+}
+
+int bt_law_first_total(int law)
+{
+    int n = 0;
+    while (law > 0) n += bt_laws[--law]->n_totals;
+    return n;
+}
+
+void bt_laws_setup(const bt_case *c, bt_params *p)
+{
+    for (int law = 0; law < BT_LAWS; law++)
+        if (bt_laws[law]->setup) bt_laws[law]->setup(c, p->law_own[law]);
+    bt_added_setup(c, p->law_own + BT_LAWS);
+}
 
 bool bt_law_on(const bt_params *p, int law)
 {
-    return law < BT_LAWS ? bt_laws[law].on && bt_laws[law].on(p) : bt_added_on(p, law);
+    return law < BT_LAWS ? bt_laws[law]->on && bt_laws[law]->on(p->law_own[law]) : bt_added_on(p, law);
 }
 
 bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b)
 {
-    return law < BT_LAWS ? bt_laws[law].applies(w, a, b) : bt_added_applies(w, law, a, b);
+    return law < BT_LAWS ? bt_laws[law]->applies(w, a, b) : bt_added_applies(w, law, a, b);
 }
 
 bool bt_laws_on(const bt_params *p)
@@ -65,7 +66,7 @@ void bt_laws_prune(const bt_world *w, bt_cell *t)
     bt_idx kept = 0;
     for (bt_idx k = 0; k < t->laws.n_memory; k++) {
         bt_memory *r = &t->laws.memory[k];
-        if (r->law < BT_LAWS ? bt_laws[r->law].keeps(w, r) : bt_law_near(w, r)) t->laws.memory[kept++] = *r;
+        if (r->law < BT_LAWS ? bt_laws[r->law]->keeps(w, r) : bt_law_near(w, r)) t->laws.memory[kept++] = *r;
     }
     t->laws.n_memory = kept;
 }
@@ -90,8 +91,8 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     for (int law = BT_ALL_LAWS - 1; m->n_points > 0 && law >= BT_LAWS; law--)
         if (bt_law_on(&w->par, law) && bt_added_applies(w, law, m->a, m->b)) bt_added_bound(w, law, t, j, p);
     for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {
-        if (m->n_points == 0 && !bt_laws[law].contact) continue; // sheets are of one law alone
-        if (bt_law_on(&w->par, law) && bt_laws[law].applies(w, m->a, m->b)) bt_laws[law].bound(w, t, j, p, m);
+        if (m->n_points == 0 && !bt_laws[law]->contact) continue; // sheets are of one law alone
+        if (bt_law_on(&w->par, law) && bt_laws[law]->applies(w, m->a, m->b)) bt_laws[law]->bound(w, t, j, p, m);
     }
     for (int i = 0; i < m->n_points; i++) l->place[i] = bt_max(t->gaps[j].gap[i], 0) / w->par.dt;
 }
@@ -108,18 +109,16 @@ double bt_laws_overlap(const bt_cell *t)
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-/// Where each number of a step comes from.
-static void into_stats(bt_step_stats *st, const bt_totals *t, const double most[BT_LAWS])
+/// Sums of the numbers of a law; those of added laws come first.
+static bt_sum *sums_of(bt_totals *t, int law) { return t->sum + bt_added_sums() + bt_law_first_number(law); }
+
+static void into_stats(bt_step_stats *st, bt_totals *t, const double most[BT_LAWS])
 {
-    st->crushed_work = bt_sum_value(&t->sum[BT_CRUSHED_WORK]);
-    st->n_crushing = (int64_t)bt_sum_value(&t->sum[BT_CRUSHING_POINTS]);
-    st->raft_edge_work = bt_sum_value(&t->sum[BT_RAFT_EDGE_WORK]);
-    st->raft_friction_work = bt_sum_value(&t->sum[BT_RAFT_FRICTION_WORK]);
-    st->n_rafting = (int64_t)bt_sum_value(&t->sum[BT_RAFTING_PAIRS]);
-    st->rafted_area = bt_sum_value(&t->sum[BT_RAFTED_AREA]);
-    st->rafted_energy = bt_sum_value(&t->sum[BT_RAFTED_ENERGY]);
-    st->crushed_depth = most[BT_LAW_CRUSHING];
-    st->rafted_largest = most[BT_LAW_RAFTING];
+    for (int law = 0; law < BT_LAWS; law++) {
+        double *number = st->laws + bt_law_first_number(law);
+        for (int k = 0; k < bt_laws[law]->n_numbers; k++)
+            number[k] = bt_laws[law]->numbers[k].largest ? most[law] : bt_sum_value(&sums_of(t, law)[k]);
+    }
     bt_added_stats(st, t);
 }
 
@@ -128,7 +127,7 @@ static int yields(const bt_contact *u, const bt_limit *l, int i)
 {
     if (l->by[i] >= BT_LAWS && bt_added_gives_way(u, l, i, l->by[i])) return l->by[i];
     int law = BT_LAWS - 1;
-    while (law > BT_LAW_RIGID && !bt_laws[law].gives_way(u, l, i)) law--;
+    while (law > BT_LAW_RIGID && !bt_laws[law]->gives_way(u, l, i)) law--;
     return law;
 }
 
@@ -143,7 +142,7 @@ static void grow_contact(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
         const int law = yields(u, l, i);
         if (law == BT_LAW_RIGID) continue;
         l->grown[i] = w->par.dt * approach;
-        if (law < BT_LAWS) bt_laws[law].give_way(w, t, j, i, totals);
+        if (law < BT_LAWS) bt_laws[law]->give_way(w, t, j, i, sums_of(totals, law));
         else bt_added_give_way(w, law, t, j, i, totals);
     }
 }
@@ -157,7 +156,8 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
     for (bt_idx j = 0; j < t->n_contacts; j++) {
         grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
-            if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law].remember(w, t, j, totals));
+            if (bt_law_on(&w->par, law))
+                most[law] = bt_max(most[law], bt_laws[law]->remember(w, t, j, sums_of(totals, law)));
         for (int law = BT_LAWS; law < BT_ALL_LAWS; law++)
             if (bt_law_on(&w->par, law)) bt_added_remember(w, law, t, j, totals);
     }
@@ -176,13 +176,13 @@ static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *to
             const bt_memory *r = &ts->cell[k].laws.memory[i];
             if (r->law == BT_LAW_CRUSHING && ts->cell[k].n_contacts > 0) continue;
             if (r->law >= BT_LAWS) bt_added_count(w, r, totals);
-            else most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
+            else most[r->law] = bt_max(most[r->law], bt_laws[r->law]->count(w, r, sums_of(totals, r->law)));
         }
 }
 
 void bt_laws_grow(bt_world *w)
 {
-    bt_totals t = {.n_sums = BT_LAW_SUMS + bt_added_sums()};
+    bt_totals t = {.n_sums = bt_law_first_number(BT_LAWS) + bt_added_sums()};
     double most[BT_LAWS] = {0};
     if (bt_laws_on(&w->par)) {
         bt_phases_any_order(w, grow_cell, NULL, &t);

@@ -19,26 +19,47 @@
 // approach, `give_way` books what that took, and `remember` writes the record.
 //
 // A law that bounds the load of points from what their pair remembers is one source file (bergtow/contact.h,
-// contact/added.h). One that changes what touches, or whose bound rises with the approach, is a row in bt_laws, keys
-// in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and src/output/record_series.c, and a test in
-// tests/physics. The sweep is not touched by either.
+// contact/added.h). One that changes what touches, or whose bound rises with the approach, is one source file with its
+// bt_law, a number in the enum below and a row in bt_laws, its keys in src/case/schema.c, and a test in tests/physics.
+// Series, summary, checkpoints and texts take its numbers from its tables; the sweep is touched by neither.
 #ifndef BERGTOW_LAW_H
 #define BERGTOW_LAW_H
 
+#include "bergtow/case.h"
+#include "bergtow/quantity.h"
 #include "contact/contacts.h"
 #include "space/phases.h"
 #include "space/cells.h"
 
 /// The program's own; laws that a program adds (bergtow/contact.h) follow from BT_LAWS on.
 enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS, BT_ALL_LAWS = BT_LAWS + BT_MAX_ADDED_LAWS };
+_Static_assert((int)BT_ALL_LAWS <= (int)BT_MAX_LAWS, "each has its numbers of the case in bt_params.law_own");
+_Static_assert(BT_MAX_LAW_NUMBERS + BT_MAX_ADDED_LAWS * (1 + BT_MAX_CONTACT_NUMBERS) <= BT_MAX_TOTALS,
+               "a pass adds up the numbers of all laws");
+enum { BT_MAX_LAW_TOTALS = 16 };
 
-/// What the laws book in a step: exact sums.
-enum {
-    BT_CRUSHED_WORK, BT_CRUSHING_POINTS,
-    BT_RAFT_EDGE_WORK, BT_RAFT_FRICTION_WORK, BT_RAFTING_PAIRS, BT_RAFTED_AREA, BT_RAFTED_ENERGY,
-    BT_LAW_SUMS, ///< from here on those of laws that were added: work and numbers of each
-    BT_ALL_SUMS = BT_LAW_SUMS + BT_MAX_ADDED_LAWS * (1 + BT_MAX_CONTACT_NUMBERS)
-};
+/// A number that a law forms in every step, over all ranks: a series (bergtow/quantity.h).
+typedef struct bt_law_number {
+    const char *name, *units, *description;
+    bt_keep keep;     ///< how steps merge
+    bool largest;     ///< what `remember` and `count` return, one number of a law at most; else an exact sum
+    const char *key;  ///< of the total in summary.json that stands for it
+} bt_law_number;
+
+/// How a run takes the steps together. STEPS: those in which the number is not 0; LAST: what it was in the last step.
+typedef enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } bt_total_rule;
+
+/// A running total of a number of a law, in checkpoints and in summary.json. None is renamed: files have the names.
+typedef struct bt_law_total {
+    int number;                      ///< of its law
+    bt_total_rule rule;
+    const char *name;                ///< in a checkpoint, under history
+    bool later;                      ///< not in checkpoints of before there was the law: then 0
+    const char *key, *units, *description;
+} bt_law_total;
+
+/// A total over a run: whole of BT_TOTAL_STEPS, else real.
+typedef union bt_total_value { double real; int64_t whole; } bt_total_value;
 
 /// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
@@ -61,7 +82,13 @@ typedef struct bt_law {
     const char *name;  ///< one word
     const char *keys;  ///< section of the case, NULL = none
     const char *what;  ///< one sentence for people
-    bool (*on)(const bt_params *p);
+    /// own[] from the case: bt_params.law_own. Not of the rigid law, as all that follows
+    void (*setup)(const bt_case *c, double own[BT_MAX_CONTACT_OWN]);
+    bool (*on)(const double *own);
+    const bt_law_number *numbers; ///< [n_numbers]
+    int n_numbers;
+    const bt_law_total *totals;   ///< [n_totals], in the order of the summary
+    int n_totals;
     /// To this pair?
     bool (*applies)(const bt_world *w, bt_idx a, bt_idx b);
     /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h).
@@ -75,14 +102,30 @@ typedef struct bt_law {
     /// Is point i of the contact at the bound of this law?
     bool (*gives_way)(const bt_contact *u, const bt_limit *l, int i);
     /// It is, and approaches: limits[j].grown[i] has been set.
-    void (*give_way)(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals);
+    /// number, here and below: [n_numbers] the sums of the law's numbers.
+    void (*give_way)(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number);
     /// After the solve: into the records of the cell. Returns what the law wants the largest of.
-    double (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals);
+    double (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number);
     /// A record into the sums; the same largest. Of all records, also where nothing moves.
-    double (*count)(const bt_world *w, const bt_memory *r, bt_totals *totals);
+    double (*count)(const bt_world *w, const bt_memory *r, bt_sum *number);
+    // texts in new memory, or NULL for nothing to say
+    /// A line of `bergtow check`: what the law means for floes of this thickness and mean size, m.
+    char *(*check)(const bt_case *c, double thickness, double size);
+    /// A line of the table at the end of a run: total [n_totals], area of all ice, m².
+    char *(*result)(const bt_case *c, const bt_total_value *total, double ice_area);
+    /// A doubt about these numbers, in a sentence; size: mean of the floes, m.
+    char *(*doubt)(const bt_total_value *total, double size);
 } bt_law;
 
-extern const bt_law bt_laws[BT_LAWS];
+extern const bt_law *const bt_laws[BT_LAWS];
+
+/// Numbers of all laws of the program, one law after the other: those of law `law` from bt_law_first_number(law) on,
+/// of all up to bt_law_first_number(BT_LAWS).
+int bt_law_first_number(int law);
+/// And their totals.
+int bt_law_first_total(int law);
+/// Numbers of the laws from a case.
+void bt_laws_setup(const bt_case *c, bt_params *p);
 
 /// Bounds with a rising part: contacts with them are not swept in batches (src/solve/batch.h).
 bool bt_laws_rise(const bt_params *p);

@@ -7,13 +7,85 @@
 #include "contact/overlap.h"
 #include "contact/work.h"
 #include "base/elementary.h"
+#include "case/case_derived.h"
 
 // Of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other.
 #define LEAST_LENGTH 1e-3
 
-bool bt_raft_on(const bt_params *p) { return p->raft_line > 0; }
+// --- numbers ---------------------------------------------------------------------------------------------------------
 
-bool bt_raft_applies(const bt_world *w, bt_idx a, bt_idx b)
+enum { PAIRS, AREA, LARGEST, ENERGY, EDGE_WORK, FRICTION_WORK };
+static const bt_law_number numbers[] = {
+    [PAIRS] = {"rafting", "1", "pairs of floes that lie over each other", BT_KEEP_LAST, .key = "rafting_pairs"},
+    [AREA] = {"rafted_area", "m2", "area in which floes lie over each other, pair by pair, at the start of the step",
+              BT_KEEP_LAST, .key = "rafted_area_m2"},
+    [LARGEST] = {"rafted_largest", "m2", "the largest such area of one pair", BT_KEEP_MAX, .largest = true,
+                 .key = "largest_rafted_pair_m2"},
+    [ENERGY] = {"rafted_energy", "J",
+                "potential energy of floes that lie over each other, above that of floes side by side", BT_KEEP_LAST,
+                .key = "rafted_energy_j"},
+    [EDGE_WORK] = {"raft_edge_work", "J",
+                   "work taken by edges that raft: their load is at the bound; part of it is in rafted_energy, the "
+                   "rest is lost",
+                   BT_KEEP_SUM, .key = "raft_edge_work_j"},
+    [FRICTION_WORK] = {"raft_friction_work", "J", "work taken by friction between floes that lie over each other",
+                       BT_KEEP_SUM, .key = "raft_friction_work_j"},
+};
+
+enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MOST_AREA, LARGEST_PAIR, ALL_ENERGY,
+       ALL_EDGE_WORK, ALL_FRICTION_WORK };
+static const bt_law_total totals[] = {
+    [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", true, "rafting_pairs", "1",
+                   "pairs of floes that lie over each other, at the end"},
+    [ALL_AREA] = {AREA, BT_TOTAL_LAST, "rafted_area", true, "rafted_area_m2", "m2",
+                  "area in which they do, pair by pair, at the end"},
+    [MOST_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", true, "max_rafted_area_m2", "m2",
+                   "the largest such area of a step"},
+    [LARGEST_PAIR] = {LARGEST, BT_TOTAL_MAX, "rafted_largest", true, "largest_rafted_pair_m2", "m2",
+                      "the largest area of one pair"},
+    [ALL_ENERGY] = {ENERGY, BT_TOTAL_LAST, "rafted_energy", true, "rafted_energy_j", "J",
+                    "potential energy of floes that lie over each other, above that of floes side by side, at the end"},
+    [ALL_EDGE_WORK] = {EDGE_WORK, BT_TOTAL_SUM, "raft_edge_work", true, "raft_edge_work_j", "J",
+                       "work taken by edges that raft"},
+    [ALL_FRICTION_WORK] = {FRICTION_WORK, BT_TOTAL_SUM, "raft_friction_work", true, "raft_friction_work_j", "J",
+                           "work taken by friction between floes that lie over each other"},
+};
+
+static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
+{
+    const double rise = bt_case_rise(c->ice.density, c->water.density);
+    own[BT_RAFT_LINE] = c->ice.rafting_kappa * 0.5 * rise;
+    own[BT_RAFT_SHEET] = (c->water.density - c->ice.density) * BT_GRAVITY;
+    own[BT_RAFT_RISE] = rise;
+}
+
+static bool on(const double *own) { return own[BT_RAFT_LINE] > 0; }
+
+static char *check(const bt_case *c, double thickness, double size)
+{
+    if (!(c->ice.rafting_kappa > 0)) return NULL;
+    const double h = thickness,
+                 line = 0.5 * c->ice.rafting_kappa * bt_case_rise(c->ice.density, c->water.density) * h * h;
+    return bt_text_of(
+        "rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an "
+        "edge of a mean floe's width rafts at %.4g N\n",
+        line, c->ice.rafting_kappa, c->ice.friction * (c->water.density - c->ice.density) * BT_GRAVITY * h,
+        line * size);
+}
+
+static char *result(const bt_case *c, const bt_total_value *total, double ice_area)
+{
+    if (!(c->ice.rafting_kappa > 0)) return NULL;
+    return bt_text_of(
+        "  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J "
+        "of it in the sheets' height, friction between sheets %.4g J\n",
+        total[ALL_AREA].real, ice_area > 0 ? 100 * total[ALL_AREA].real / ice_area : 0.0, total[ALL_PAIRS].real,
+        total[ALL_EDGE_WORK].real, total[ALL_ENERGY].real, total[ALL_FRICTION_WORK].real);
+}
+
+static const double *own_of(const bt_world *w) { return w->par.law_own[BT_LAW_RAFTING]; }
+
+static bool applies(const bt_world *w, bt_idx a, bt_idx b)
 {
     const bt_bodies *s = &w->bodies;
     const bool ice = s->thickness[a] > 0 && s->thickness[b] > 0, towed = s->gid[a] == w->towed || s->gid[b] == w->towed;
@@ -26,12 +98,12 @@ static double thinner(const bt_bodies *s, bt_idx a, bt_idx b) { return bt_min(s-
 static double line_load(const bt_world *w, bt_idx a, bt_idx b)
 {
     const double h = thinner(&w->bodies, a, b);
-    return w->par.raft_line * h * h;
+    return own_of(w)[BT_RAFT_LINE] * h * h;
 }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-bool bt_raft_keeps(const bt_world *w, bt_memory *r)
+static bool keeps(const bt_world *w, bt_memory *r)
 {
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
     if (a < 0 || b < 0) return false;
@@ -43,14 +115,14 @@ bool bt_raft_keeps(const bt_world *w, bt_memory *r)
     return r->value[1] > 0;
 }
 
-double bt_raft_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
+static double count(const bt_world *w, const bt_memory *r, bt_sum *number)
 {
     const bt_bodies *s = &w->bodies;
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
     if (!(r->value[1] > 0)) return 0;
-    bt_sum_add(&totals->sum[BT_RAFTING_PAIRS], 1);
-    bt_sum_add(&totals->sum[BT_RAFTED_AREA], r->value[1]);
-    bt_sum_add(&totals->sum[BT_RAFTED_ENERGY], w->par.raft_rise * s->thickness[a] * s->thickness[b] * r->value[1]);
+    bt_sum_add(&number[PAIRS], 1);
+    bt_sum_add(&number[AREA], r->value[1]);
+    bt_sum_add(&number[ENERGY], own_of(w)[BT_RAFT_RISE] * s->thickness[a] * s->thickness[b] * r->value[1]);
     return r->value[1];
 }
 
@@ -74,7 +146,7 @@ static void edge_of(const double grad[2], double turn, double length, double gap
 }
 
 /// False without an edge; `sheets` always.
-bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
+static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
 {
     bt_overlap o;
     double grad[2], turn, centroid[2], off[2];
@@ -109,12 +181,12 @@ static void lengths_of(const bt_manifold *m, double slop, double length[2])
 static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
 {
     bt_contact *u = &t->contacts[j];
-    const double pressure = w->par.raft_sheet * thinner(&w->bodies, u->a, u->b);
+    const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
     t->laws.limits[j].flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
-void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->laws.limits[j];
     const bt_memory names = bt_law_names(w, p, BT_LAW_RAFTING);
@@ -134,18 +206,18 @@ void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i)
+static bool gives_way(const bt_contact *u, const bt_limit *l, int i)
 {
     return l->by[i] == BT_LAW_RAFTING && u->ln[i] >= l->cap[i];
 }
 
-void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
+static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 {
-    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
+    bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
-double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
+static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
@@ -153,14 +225,35 @@ double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     if (u->n == 0) {
         t->laws.memory[at].value[2] = u->ln[0];
         t->laws.memory[at].value[3] = u->lt;
-        bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_contacts_work(w, u));
+        bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(w, u));
         return 0;
     }
     bool begins = false;
-    for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && bt_raft_gives_way(u, l, i));
+    for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && gives_way(u, l, i));
     if (!begins || at >= 0) return 0;
     bt_memory r = bt_law_names(w, &t->search.pairs[t->contacts[j].pair], BT_LAW_RAFTING);
     r.n_points = 2;
     bt_law_put(t, -1, &r);
     return 0;
 }
+
+const bt_law bt_raft_law = {.name = "rafting",
+                            .keys = "ice.rafting",
+                            .what =
+                            "edges bear a line load, and floes that are pressed together harder slide over each other",
+                            .setup = setup,
+                            .on = on,
+                            .numbers = numbers,
+                            .n_numbers = sizeof numbers / sizeof *numbers,
+                            .totals = totals,
+                            .n_totals = sizeof totals / sizeof *totals,
+                            .applies = applies,
+                            .contact = contact,
+                            .bound = bound,
+                            .keeps = keeps,
+                            .gives_way = gives_way,
+                            .give_way = give_way,
+                            .remember = remember,
+                            .count = count,
+                            .check = check,
+                            .result = result};

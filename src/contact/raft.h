@@ -58,15 +58,14 @@
 
 #include "contact/law.h"
 
-// The rafting law's row in the table (contact/law.h). Its record: A*, A (m²), friction along x and y (N s).
-bool bt_raft_on(const bt_params *p);
-bool bt_raft_applies(const bt_world *w, bt_idx a, bt_idx b);
-bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets);
-void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-bool bt_raft_keeps(const bt_world *w, bt_memory *r);
-bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i);
-void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals);
-double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals);
-double bt_raft_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
+/// Its record: A*, A (m²), friction along x and y (N s).
+extern const bt_law bt_raft_law;
+
+/// Its numbers of the case, Pa/m: line load under which floes raft / thickness², 0 = they do not; pressure between
+/// sheets on each other / thickness; potential energy of sheets on each other / (area × both thicknesses).
+enum { BT_RAFT_LINE, BT_RAFT_SHEET, BT_RAFT_RISE };
+
+/// Which of its totals is the area of sheets at the end, m²: the summary also has it over the area of all ice.
+enum { BT_RAFT_TOTAL_AREA = 1 };
 
 #endif

@@ -8,7 +8,7 @@
 static bool is_known(const char *name)
 {
     for (int law = 0; law < BT_LAWS; law++)
-        if (!strcmp(bt_laws[law].name, name)) return true;
+        if (!strcmp(bt_laws[law]->name, name)) return true;
     for (int k = 0; k < bt_n_contact_laws(); k++)
         if (!strcmp(bt_contact_law_of(k)->name, name)) return true;
     return false;

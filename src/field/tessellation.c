@@ -19,6 +19,7 @@
 #include <string.h>
 
 #include "field/field_make.h"
+#include "base/inside.h"
 #include "base/elementary.h"
 #include "base/rng.h"
 

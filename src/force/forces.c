@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Free velocity of every body by the forces on it, and the rest and free drift of floes; equations in bergtow/forces.h.
-#include "bergtow/forces.h"
+#include "force/forces.h"
+#include "base/inside.h"
 
 #include <math.h>
 

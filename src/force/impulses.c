@@ -13,6 +13,7 @@
 // left of M (U2 − U1) when all else is taken away. A law that is forgotten there is booked as drag, and the balance
 // closes. Of a kinematic body U1 = U* = U2 is the prescribed velocity, and the rotation that of its rate, Δt m f k×U.
 #include "force/load.h"
+#include "force/forces.h"
 
 /// State of a body over a step.
 typedef struct {

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/name.h"
+#include "force/forces.h"
 #include "case/schema.h"
 #include "force/laws.h"
 

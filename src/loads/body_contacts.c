@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Contacts of the towed body as a step leaves them: where, how hard, how fast; see loads/impact.h for the equations.
 #include "loads/body_contacts.h"
+#include "base/inside.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Files of checkpoints: written beside, renamed in turn, read with a second one to fall back on.
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bergtow/quantity.h"
+#include "contact/law.h"
 
 typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text
@@ -177,20 +178,9 @@ static const row rows[] = {
     {"history/sum_checks", "1", "residuals of contacts that were taken, sum over the steps", "one"},
     {"history/sum_projected", "1", "updates of contacts by the position projection, sum over the steps", "one"},
     {"history/contact_work", "J", "work of the contact impulses so far", "one"},
-    {"history/crushed_work", "J", "work taken by crushing so far", "one"},
     {"history/max_overlap", "m", "largest overlap so far", "one"},
     {"history/max_momentum_residual", "1", "largest residual of the momentum balance so far", "one"},
     {"history/max_residual", "m/s", "largest residual of the solver so far", "one"},
-    {"history/max_crushed_depth", "m", "deepest crush so far", "one"},
-    {"history/max_crushing", "1", "most contact points that crushed in a step", "one"},
-    {"history/crushing_steps", "1", "steps in which ice was crushed", "one"},
-    {"history/rafting", "1", "pairs that raft", "one"},
-    {"history/rafted_area", "m2", "area in which floes lie over each other", "one"},
-    {"history/rafted_energy", "J", "potential energy of these floes", "one"},
-    {"history/max_rafted_area", "m2", "largest such area so far", "one"},
-    {"history/rafted_largest", "m2", "largest such area of one pair so far", "one"},
-    {"history/raft_edge_work", "J", "work taken by edges that raft so far", "one"},
-    {"history/raft_friction_work", "J", "work taken by friction between sheets so far", "one"},
     {"history/unconverged", "1", "steps that did not converge", "one"},
     {"history/locked_steps", "1", "of them, steps in which some bodies could not give way", "one"},
     {"history/unprojected", "1", "steps whose overlap was not removed", "one"},
@@ -234,6 +224,13 @@ const char *bt_checkpoint_meaning(const char *name, const char **units, const ch
             *axes = rows[k].axes;
             return rows[k].meaning;
         }
+    for (int law = 0; law < BT_LAWS && !strncmp(name, "history/", 8); law++)
+        for (int k = 0; k < bt_laws[law]->n_totals; k++)
+            if (!strcmp(bt_laws[law]->totals[k].name, name + 8)) {
+                *units = bt_laws[law]->totals[k].units;
+                *axes = "one";
+                return bt_laws[law]->totals[k].description;
+            }
     const bt_quantity *q = strncmp(name, added, sizeof added - 1) ? NULL : bt_series_find(name + sizeof added - 1);
     *units = q ? q->units : NULL;
     *axes = "time";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Quantities of added contact laws; see contact_quantities.h.
+// Quantities of contact laws; see contact_quantities.h.
 #include "output/contact_quantities.h"
 
 #include <stdio.h>
@@ -7,6 +7,30 @@
 
 #include "bergtow/contact.h"
 #include "bergtow/quantity.h"
+#include "contact/law.h"
+#include "output/record.h"
+
+static bt_quantity own[BT_MAX_LAW_NUMBERS];
+
+static double own_number(const bt_world *w, const void *quantity)
+{
+    return w->stats.laws[(const bt_quantity *)quantity - own];
+}
+
+int bt_n_law_series(void) { return bt_law_first_number(BT_LAWS); }
+
+const bt_quantity *bt_law_series(int k)
+{
+    for (int law = 0, i = 0; !own[k].name && law < BT_LAWS; law++)
+        for (int j = 0; j < bt_laws[law]->n_numbers; j++, i++) {
+            const bt_law_number *n = &bt_laws[law]->numbers[j];
+            own[i] = (bt_quantity){.name = n->name, .units = n->units, .description = n->description, .keep = n->keep,
+                                   .applies = BT_APPLIES_ALWAYS, .summary = n->key, .of_world = own_number,
+                                   .context = &own[i],
+                                   .offset = offsetof(bt_sample, laws) + (size_t)i * sizeof(double)};
+        }
+    return &own[k];
+}
 
 static double number(const bt_world *w, const void *place)
 {

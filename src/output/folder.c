@@ -12,7 +12,7 @@
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "bergtow/case.h"
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "output/record_parts.h"
 #include "output/xdmf.h"
 

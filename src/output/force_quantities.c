@@ -6,24 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bergtow/quantity.h"
-#include "tow/tow.h"
+#include "output/record.h"
 
-double bt_force_against(const bt_world *w, int k)
+/// Is its force one of the program's own series?
+static bool has_series(const bt_force_series *of)
 {
-    const bt_impulse *j = &w->forces->series[k];
-    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
-}
-
-static double against(const bt_world *w, const void *series)
-{
-    return bt_force_against(w, (int)((const bt_force_series *)series - bt_force_series_of));
-}
-
-/// Forces that a sample has members for.
-static bool has_member(const char *name)
-{
-    return !strcmp(name, "drag") || !strcmp(name, "coriolis") || !strcmp(name, "tilt");
+    for (int k = 0; k < bt_n_own_series; k++)
+        if (bt_own_series[k].of_world == bt_force_of && !strcmp(bt_own_series[k].context, of->name)) return true;
+    return false;
 }
 
 /// Its texts stay for the life of the program, as the law does.
@@ -33,7 +23,8 @@ static void add_quantity(const bt_force_series *of)
     char *name = bt_text_of("%s_force", of->name),
          *text = bt_text_of("%s on the towed body against the tow direction", of->law ? of->law->doc : of->name);
     const bt_quantity q = {.name = name, .units = "N", .description = text, .label = of->name, .keep = BT_KEEP_MEAN,
-                           .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE, .of_world = against, .context = of};
+                           .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE, .of_world = bt_force_of,
+                           .context = of->name};
     if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);
     bt_errors_free(&err);
 }
@@ -46,7 +37,7 @@ void bt_force_quantities(void)
     known = bt_n_force_series;
     for (int k = 0; k < bt_n_force_wholes; k++) {
         const bt_force_series *of = &bt_force_series_of[k];
-        if (has_member(of->name) || added[k]) continue;
+        if (has_series(of) || added[k]) continue;
         added[k] = true;
         add_quantity(of);
     }

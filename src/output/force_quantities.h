@@ -5,10 +5,7 @@
 
 #include "bergtow/forces.h"
 
-/// Force of series k (bt_force_series_of) on the towed body against the tow direction in the step just solved, N.
-double bt_force_against(const bt_world *w, int k);
-
-/// Register a quantity for each series of the table of force laws that a sample has no member for, once.
+/// Register a quantity for each series of the table of force laws that is none of the program's own series, once.
 void bt_force_quantities(void);
 
 #endif

@@ -183,3 +183,10 @@ bt_frame_line bt_gather_line(const bt_world *w)
     }
     return line;
 }
+
+void bt_roster_free(bt_roster *r)
+{
+    free(r->thickness);
+    free(r->names);
+    *r = (bt_roster){0};
+}

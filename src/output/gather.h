@@ -4,7 +4,7 @@
 #define BT_GATHER_H
 
 #include "output/record.h"
-#include "bergtow/setup.h"
+#include "output/roster.h"
 #include "bergtow/world.h"
 
 /// Collective. The outlines of this rank's block, for bt_record_open; released with bt_gather_free.

@@ -56,7 +56,7 @@ static double added_energy(const bt_sample *s) { return s->contact_work > WORK_R
         .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
         .offset = offsetof(bt_sample, from), .missing = BT_TOTAL_##missing_                                            \
     }
-const bt_total bt_history_totals[BT_N_TOTALS] = {
+static const bt_total totals[] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
     TOTAL(F64, sum_updates, SUM, unit_updates),
@@ -67,17 +67,6 @@ const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, max_overlap, MAX, overlap),
     TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
     TOTAL(F64, max_residual, MAX, residual),
-    TOTAL(F64, crushed_work, SUM, crushed_work),
-    TOTAL(F64, max_crushed_depth, MAX, crushed_depth),
-    TOTAL(F64, max_crushing, MAX, crushing),
-    TOTAL(I64, crushing_steps, STEPS, crushing),
-    LATER(F64, rafting, LAST, rafting, ZERO),
-    LATER(F64, rafted_area, LAST, rafted_area, ZERO),
-    LATER(F64, rafted_energy, LAST, rafted_energy, ZERO),
-    LATER(F64, max_rafted_area, MAX, rafted_area, ZERO),
-    LATER(F64, rafted_largest, MAX, rafted_largest, ZERO),
-    LATER(F64, raft_edge_work, SUM, raft_edge_work, ZERO),
-    LATER(F64, raft_friction_work, SUM, raft_friction_work, ZERO),
     TOTAL(I64, unconverged, STEPS, unconverged),
     LATER(F64, locked_steps, STEPS, locked, UNKNOWN),
     TOTAL(I64, unprojected, STEPS, unprojected),
@@ -88,6 +77,29 @@ const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(I64, repeats, SUM, repeats),
     TOTAL(I64, outrun, STEPS, outrun),
 };
+
+enum { N_TOTALS = sizeof totals / sizeof *totals };
+
+int bt_n_history_totals(void) { return N_TOTALS + bt_law_first_total(BT_LAWS); }
+
+/// Those of the contact laws, made of their tables once.
+static const bt_total *total_of_law(int k)
+{
+    static bt_total made[BT_MAX_LAW_TOTALS];
+    for (int law = 0, i = 0; !made[k].at.name && law < BT_LAWS; law++)
+        for (int j = 0; j < bt_laws[law]->n_totals; j++, i++) {
+            const bt_law_total *t = &bt_laws[law]->totals[j];
+            const int number = bt_law_first_number(law) + t->number;
+            made[i] = (bt_total){
+                .at = {t->name, t->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
+                       offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value)},
+                .rule = t->rule, .missing = t->later ? BT_TOTAL_ZERO : BT_TOTAL_THERE,
+                .offset = offsetof(bt_sample, laws) + (size_t)number * sizeof(double)};
+        }
+    return &made[k];
+}
+
+const bt_total *bt_history_total(int k) { return k < N_TOTALS ? &totals[k] : total_of_law(k - N_TOTALS); }
 
 /// A step into a total. Counts of whole numbers are exact in a double up to 2⁵³, far beyond any run.
 static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
@@ -136,5 +148,5 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
         h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
     h->n++;
-    for (int k = 0; k < BT_N_TOTALS; k++) add_total(h, &bt_history_totals[k], s);
+    for (int k = 0; k < bt_n_history_totals(); k++) add_total(h, bt_history_total(k), s);
 }

@@ -4,6 +4,7 @@
 #define BT_HISTORY_H
 
 #include "base/snapshot.h"
+#include "contact/law.h"
 #include "output/record.h"
 
 /// Columns of what the summary keeps of every step; names and members of the sample: history.c.
@@ -32,30 +33,27 @@ typedef struct bt_history {
     int n_columns;                   ///< the program's own, then one for each registered quantity
     /// [n] each, units as in bt_sample; NaN where a step has no such number
     double *column[BT_N_COLUMNS + BT_MAX_ADDED];
-    // running totals: bt_history_totals
+    // running totals: bt_history_total
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, sum_checks, sum_projected, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
-    double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
-    int64_t crushing_steps;
-    double rafting, rafted_area, rafted_energy;  ///< in the last step, as in bt_sample
-    double max_rafted_area, rafted_largest, raft_edge_work, raft_friction_work; ///< m², m², J, J
     double locked_steps;
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
+    bt_total_value laws[BT_MAX_LAW_TOTALS]; ///< of the contact laws, in their order (contact/law.h)
 } bt_history;
 
-enum { BT_N_TOTALS = 28, BT_HISTORY_NAME = 80 };
+enum { BT_HISTORY_NAME = 80 };
 
 /// A running total: its member of bt_history, what it takes of a step, and how.
 typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
-    /// STEPS: those in which the number is not 0; LAST: what it was in the last step
-    enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } rule;
+    bt_total_rule rule;
     /// In a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
     enum { BT_TOTAL_THERE, BT_TOTAL_ZERO, BT_TOTAL_UNKNOWN } missing;
     size_t offset;                        ///< of the number in bt_sample
     double (*of)(const bt_sample *s);     ///< or a function of it
 } bt_total;
-extern const bt_total bt_history_totals[BT_N_TOTALS];
+int bt_n_history_totals(void);
+const bt_total *bt_history_total(int k);
 
 /// Name of a column in the checkpoint; returns name.
 #define BT_HISTORY_ADDED "history/added_"

@@ -26,6 +26,7 @@ static void write_value(bt_json *j, const bt_json_key *k, const struct bt_summar
     case BT_JSON_TEXT: bt_json_string(j, key, k->text ? k->text(v) : *(const char *const *)(const void *)at); break;
     case BT_JSON_WRITTEN:
     case BT_JSON_ADDED: k->write(j, key, v, source); break;
+    case BT_JSON_LAWS:
     case BT_JSON_GROUP: break;
     }
 }

@@ -15,7 +15,8 @@ typedef enum {
     BT_JSON_REAL, BT_JSON_INT, BT_JSON_INT32, BT_JSON_BOOL, BT_JSON_TEXT,
     BT_JSON_GROUP,   ///< an object whose members follow; null where it does not apply
     BT_JSON_WRITTEN, ///< what `write` writes, key included
-    BT_JSON_ADDED    ///< the place of the registered quantities (summary_keys.c)
+    BT_JSON_ADDED,   ///< the place of the registered quantities (summary_keys.c)
+    BT_JSON_LAWS     ///< and of the totals of contact laws, in a table that is yet to be put together
 } bt_json_kind;
 
 typedef struct bt_json_key {

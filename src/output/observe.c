@@ -8,7 +8,7 @@
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
 #include "output/observe.h"
-#include "output/force_quantities.h"
+#include "base/inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -147,9 +147,6 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->ice_moment = ice[2] / dt;
     s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt;
     s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
-    s->drag_force = bt_force_against(w, bt_force_series_find("drag"));
-    s->coriolis_force = bt_force_against(w, bt_force_series_find("coriolis"));
-    s->tilt_force = bt_force_against(w, bt_force_series_find("tilt"));
     s->inertia_force =
         b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
@@ -203,55 +200,20 @@ static double sum_of_floes(const bt_world *w, const bt_quantity *q)
     return bt_sum_value(&all.sum[0]);
 }
 
-/// Registered quantities, by one thread: their functions need not know of threads.
-static void observe_added(const bt_world *w, unsigned has, bt_sample *s)
+/// What the rows of the series say themselves, by one thread: their functions need not know of threads.
+static void observe_rows(const bt_world *w, unsigned has, bt_sample *s)
 {
-    for (int k = 0; k < bt_n_added(); k++) {
-        const bt_quantity *q = bt_added(k);
-        if (!(has & 1u << q->applies)) continue; // alike on all ranks
-        bt_sample_set(s, q, q->of_floe ? sum_of_floes(w, q) : q->of_world(w, q->context));
+    for (int k = 0; k < bt_n_series(); k++) {
+        const bt_quantity *q = bt_series(k);
+        if (!(has & 1u << q->applies)) bt_sample_set(s, q, NAN); // alike on all ranks
+        else if (q->of_floe) bt_sample_set(s, q, sum_of_floes(w, q));
+        else if (q->of_world) bt_sample_set(s, q, q->of_world(w, q->context));
     }
 }
 
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
 {
-    const bt_step_stats *st = &w->stats;
-    *s = (bt_sample){
-        .time = (double)w->step * w->par.dt,
-        .contacts = (double)st->n_points,
-        .sweeps = (double)st->sweeps,
-        .unit_updates = (double)st->unit_updates,
-        .momentum_moves = (double)st->unit_moves,
-        .residual_checks = (double)st->residual_checks,
-        .position_sweeps = (double)st->position_sweeps,
-        .position_updates = (double)st->position_updates,
-        .unprojected = !st->projected,
-        .residual = st->residual,
-        .residual_rms = st->residual_rms,
-        .active = (double)st->n_active,
-        .unconverged = !st->converged,
-        .locked = st->locked,
-        .overlap = st->overlap,
-        .momentum_residual = st->momentum_residual,
-        .kinetic_energy = st->kinetic_energy,
-        .contact_work = st->contact_work,
-        .repeats = (double)st->repeats,
-        .outrun = st->outrun,
-        .restitution_cut = st->restitution_cut,
-        .crushing = (double)st->n_crushing,
-        .crushed_work = st->crushed_work,
-        .crushed_depth = st->crushed_depth,
-        .rafting = (double)st->n_rafting,
-        .rafted_area = st->rafted_area,
-        .rafted_largest = st->rafted_largest,
-        .rafted_energy = st->rafted_energy,
-        .raft_edge_work = st->raft_edge_work,
-        .raft_friction_work = st->raft_friction_work,
-        .current_x = w->par.water_u,
-        .current_y = w->par.water_v,
-        .wind_x = w->par.air_u,
-        .wind_y = w->par.air_v,
-    };
+    *s = (bt_sample){.time = (double)w->step * w->par.dt};
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_cells(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
@@ -263,9 +225,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }
-    observe_added(w, has, s);
-    for (int k = 0; k < bt_n_series(); k++)
-        if (!(has & 1u << bt_series(k)->applies)) bt_sample_set(s, bt_series(k), NAN);
+    observe_rows(w, has, s);
 }
 
 double bt_observe_ice_area(const bt_world *w)

@@ -13,11 +13,15 @@
 #include "output/quantity_registry.h"
 #include "output/record.h"
 
-int bt_n_series(void) { return bt_n_own_series + bt_n_added(); }
+int bt_n_program_series(void) { return bt_n_own_series + bt_n_law_series(); }
+int bt_n_series(void) { return bt_n_program_series() + bt_n_added(); }
 
 const bt_quantity *bt_series(int k)
 {
-    return k < bt_n_own_series ? &bt_own_series[k] : bt_registered(k - bt_n_own_series);
+    const int before = bt_n_own_series - BT_SERIES_AFTER_LAWS, laws = bt_n_law_series();
+    if (k < before) return &bt_own_series[k];
+    if (k < before + laws) return bt_law_series(k - before);
+    return k < bt_n_program_series() ? &bt_own_series[k - laws] : bt_registered(k - bt_n_program_series());
 }
 
 int bt_n_added(void)

@@ -7,14 +7,17 @@
 #include "output/estimate_text.h"
 #include "output/summary_keys.h"
 
-/// The tables of summary.json, and what stands before their keys there.
+/// The tables of summary.json, and what stands before their keys there; the first is put together by bt_summary_keys.
 static const struct { const char *prefix; const bt_json_key *keys; const int *n; } tables[] = {
-    {"", bt_summary_keys, &bt_n_summary_keys},
+    {"", NULL, NULL},
     {"window.series.NAME.", bt_reported_keys, &bt_n_reported_keys},
     {"estimates.", bt_condition_keys, &bt_n_condition_keys},
     {"estimates.NAME.", bt_estimate_keys, &bt_n_estimate_keys},
 };
 enum { N_TABLES = sizeof tables / sizeof *tables };
+
+/// Table t, 0 = the summary's own.
+static const bt_json_key *table(int t, int *n) { return t ? (*n = *tables[t].n, tables[t].keys) : bt_summary_keys(n); }
 
 static void list_series(FILE *out)
 {
@@ -30,14 +33,15 @@ static void list_series(FILE *out)
 static void list_summary(FILE *out)
 {
     fprintf(out, "\n%-46s %-6s %s\n", "summary.json", "units", "meaning");
-    for (int t = 0; t < N_TABLES; t++)
-        for (int i = 0; i < *tables[t].n; i++) {
-            const bt_json_key *k = &tables[t].keys[i];
+    for (int t = 0, n; t < N_TABLES; t++) {
+        const bt_json_key *keys = table(t, &n);
+        for (const bt_json_key *k = keys; k < keys + n; k++) {
             if (k->kind == BT_JSON_ADDED) continue;
             char name[96];
             snprintf(name, sizeof name, "%s%s", tables[t].prefix, k->key);
             fprintf(out, "%-46s %-6s %s\n", name, k->units, k->description);
         }
+    }
     for (int k = 0; k < bt_n_added(); k++)
         fprintf(out, "%-46s %-6s %s\n", bt_added(k)->summary, bt_added(k)->units, bt_added(k)->description);
 }
@@ -113,9 +117,11 @@ void bt_quantities_list_json(void *stream)
     for (int k = 0; k < bt_n_series(); k++) json_series(&j, bt_series(k));
     bt_json_close(&j, ']');
     bt_json_open(&j, "summary", '[');
-    for (int t = 0; t < N_TABLES; t++)
-        for (int i = 0; i < *tables[t].n; i++)
-            if (tables[t].keys[i].kind != BT_JSON_ADDED) json_summary_key(&j, tables[t].prefix, &tables[t].keys[i]);
+    for (int t = 0, n; t < N_TABLES; t++) {
+        const bt_json_key *keys = table(t, &n);
+        for (const bt_json_key *k = keys; k < keys + n; k++)
+            if (k->kind != BT_JSON_ADDED) json_summary_key(&j, tables[t].prefix, k);
+    }
     for (int k = 0; k < bt_n_added(); k++) json_added(&j, bt_added(k));
     bt_json_close(&j, ']');
     bt_json_open(&j, "estimates", '[');

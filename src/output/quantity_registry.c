@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/name.h"
+#include "contact/law.h"
 #include "output/record.h"
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
@@ -34,6 +35,9 @@ static bool is_taken(const char *name)
 {
     for (int k = 0; k < bt_n_own_series; k++)
         if (!strcmp(bt_own_series[k].name, name)) return true;
+    for (int law = 0; law < BT_LAWS; law++)
+        for (int k = 0; k < bt_laws[law]->n_numbers; k++)
+            if (!strcmp(bt_laws[law]->numbers[k].name, name)) return true;
     for (int k = 0; k < n_added; k++)
         if (!strcmp(added[k].name, name)) return true;
     return false;

@@ -15,7 +15,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "base/fileio.h"
 #include "base/provenance.h"
 #include "output/folder.h"
@@ -92,6 +92,7 @@ static void record_free(bt_record *r)
     bt_history_free(&r->history);
     free(r->dir);
     free(r->series);
+    free(r->merged);
     free(r->buffer);
     free(r);
 }
@@ -143,6 +144,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     r->towed = b->towed;
     r->last_flush = bt_clock();
     bt_history_init(&r->history);
+    r->merged = bt_alloc((size_t)bt_n_series(), sizeof *r->merged);
     r->buffer = bt_alloc((size_t)bt_n_series() * BT_RECORD_BUFFER, sizeof *r->buffer);
     r->series = bt_alloc((size_t)bt_n_series(), sizeof *r->series);
     for (int k = 0; k < bt_n_series(); k++) r->series[k] = -1;
@@ -206,8 +208,6 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
     return r->h5.status;
 }
 
-static double *member(bt_sample *s, int k) { return (double *)(void *)((char *)s + bt_series(k)->offset); }
-
 void bt_record_flush(bt_record *r)
 {
     for (int k = 0; k < bt_n_series(); k++)
@@ -224,7 +224,7 @@ void bt_record_flush(bt_record *r)
 static void end_entry(bt_record *r)
 {
     for (int k = 0; k < bt_n_series(); k++) {
-        double value = *member(&r->merged, k);
+        double value = r->merged[k];
         if (bt_series(k)->keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
         r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
     }
@@ -240,7 +240,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     bt_history_add(&r->history, s);
     bt_impact_store_take(&r->impacts, s->time);
     for (int k = 0; k < bt_n_series(); k++) {
-        double *m = member(&r->merged, k);
+        double *m = &r->merged[k];
         const double x = bt_sample_value(s, bt_series(k));
         switch (r->n_merged ? bt_series(k)->keep : BT_KEEP_LAST) {
         case BT_KEEP_LAST: *m = x; break;

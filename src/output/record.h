@@ -64,24 +64,26 @@ typedef struct bt_sample {
     /// largest force of a floe on the body that no collision explains, N; NaN as for the collisions
     double largest_push;
     double moving;          ///< floes faster than 1 % of the reference speed
-    double crushing;        ///< contact points that crush (crush.h)
-    double crushed_work;    ///< taken by them in the step, J
-    double crushed_depth;   ///< deepest crush of a pair in contact, m
-    double rafting;         ///< pairs of floes that lie over each other (raft.h)
-    double rafted_area;     ///< of theirs that overlaps, at the start of the step, m²
-    double rafted_largest;  ///< the largest of one pair, m²
-    double rafted_energy;   ///< potential energy of the sheets on each other, J
-    double raft_edge_work;  ///< taken in the step by edges at their bound, J
-    double raft_friction_work; ///< and by friction between sheets, J
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
+    double laws[BT_MAX_LAW_NUMBERS]; ///< of the contact laws, as in bt_step_stats
     double added[BT_MAX_ADDED]; ///< [bt_n_added()] of the quantities that were registered
 } bt_sample;
 
-/// The program's own series, one for each member of a sample but `added`; with those registered: bt_series.
+/// The program's own series, one for each member of a sample but `laws` and `added`; those of the contact laws come
+/// before the last BT_SERIES_AFTER_LAWS. With both, and those registered: bt_series.
 extern const bt_quantity bt_own_series[];
 extern const int bt_n_own_series;
+enum { BT_SERIES_AFTER_LAWS = 3 };
+/// How many series there are before the first that is registered.
+int bt_n_program_series(void);
+
+/// Force of series k (bt_force_series_of) on the towed body against the tow direction in the step just solved, N.
+double bt_force_against(const bt_world *w, int k);
+
+/// The same by the name of the series: of_world of a quantity whose context is that name.
+double bt_force_of(const bt_world *w, const void *series);
 
 /// A number of a sample by its quantity.
 static inline double bt_sample_value(const bt_sample *s, const bt_quantity *f)

@@ -25,7 +25,7 @@ struct bt_record {
     hid_t *series;         ///< [bt_n_series()]
     double *buffer;        ///< [bt_n_series()][BT_RECORD_BUFFER]
     int64_t written, buffered;
-    bt_sample merged;      ///< of the steps of the present entry
+    double *merged;        ///< [bt_n_series()] of the steps of the present entry
     int64_t n_merged;
     double last_flush;     ///< bt_clock
     hid_t events[4];       ///< time, kind, subject, value

@@ -25,14 +25,14 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_record_flush(r);
     bt_history *h = &r->history;
     char name[BT_HISTORY_NAME];
-    for (int k = 0; k < BT_N_TOTALS; k++) bt_snapshot_add_rows(s, "history", &bt_history_totals[k].at, 1, h);
+    for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
     for (int k = 0; k < h->n_columns; k++)
         bt_snapshot_add(s, bt_history_name(k, name), BT_ITEM_F64, h->n, 1, h->column[k]);
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series() : 0, 1, &r->merged);
+    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series() : 0, 1, r->merged);
     bt_impact_store_save(&r->impacts, s);
     return r->h5.status;
 }
@@ -104,8 +104,8 @@ static void check_added(bt_snapshot *s)
 /// n: steps done; each has a value.
 static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
-    for (int k = 0; k < BT_N_TOTALS; k++) {
-        const bt_total *t = &bt_history_totals[k];
+    for (int k = 0; k < bt_n_history_totals(); k++) {
+        const bt_total *t = bt_history_total(k);
         char name[BT_HISTORY_NAME];
         snprintf(name, sizeof name, "history/%s", t->at.name);
         const double unknown = NAN;
@@ -128,12 +128,14 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     if (s->faulty) h->n = 0;
 }
 
-/// In a result without this series: a force that the run had not and floes that did not raft were 0 all the time;
-/// another number of the program's own was not taken.
+/// In a result without this series: a force and a contact law that the run had not were 0 all the time; another number
+/// of the program's own was not taken.
 static double missing_value(int k)
 {
     const bt_quantity *q = bt_series(k);
-    return was_zero(q) || !strncmp(q->name, "raft", 4) ? 0 : NAN;
+    const size_t laws = offsetof(bt_sample, laws);
+    const bool of_law = q->offset >= laws && q->offset < laws + sizeof((bt_sample){0}.laws);
+    return was_zero(q) || of_law ? 0 : NAN;
 }
 
 /// Entries 0 up to n of all series.
@@ -142,7 +144,7 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
-        const bool maybe = k < bt_n_own_series || was_zero(bt_series(k));
+        const bool maybe = k < bt_n_program_series() || was_zero(bt_series(k));
         if (maybe && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = missing_value(k);
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
@@ -256,7 +258,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
     bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
-    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series(), 1, &r->merged);
+    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series(), 1, r->merged);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {

@@ -2,14 +2,50 @@
 // The program's own series: name, unit, meaning, when it applies, how steps merge, where it is shown and summed up.
 #include "output/record.h"
 #include "case/cost.h"
+#include "tow/tow.h"
 
-#define SHOWN(name_, applies_, keep_, units_, text_, role_, label_, key_)                                              \
-    {                                                                                                                  \
-        .name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_),                   \
-        .keep = BT_KEEP_##keep_, .applies = BT_APPLIES_##applies_, .role = BT_ROLE_##role_, .label = label_,           \
-        .summary = key_                                                                                                \
+#define PARTS(name_, applies_, keep_, units_, text_, role_, label_, key_)                                              \
+    .name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_),                       \
+    .keep = BT_KEEP_##keep_, .applies = BT_APPLIES_##applies_, .role = BT_ROLE_##role_, .label = label_, .summary = key_
+#define SHOWN(...) {PARTS(__VA_ARGS__)}
+#define ROW(...) {PARTS(__VA_ARGS__, NONE, NULL, NULL)}
+
+// --- rows that say where their number is; that of the others is formed in observe.c --------------------------------
+
+/// A number of the world.
+typedef struct {
+    size_t offset;
+    enum { REAL, WHOLE, FLAG, NO_FLAG } kind; ///< NO_FLAG: 1 where it is false
+} place;
+
+static double at_place(const bt_world *w, const void *context)
+{
+    const place *p = context;
+    const void *at = (const char *)w + p->offset;
+    switch (p->kind) {
+    case WHOLE: return (double)*(const int64_t *)at;
+    case FLAG: return *(const bool *)at;
+    case NO_FLAG: return !*(const bool *)at;
+    default: return *(const double *)at;
     }
-#define ROW(name_, applies_, keep_, units_, text_) SHOWN(name_, applies_, keep_, units_, text_, NONE, NULL, NULL)
+}
+
+double bt_force_against(const bt_world *w, int k)
+{
+    const bt_impulse *j = &w->forces->series[k];
+    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
+}
+
+double bt_force_of(const bt_world *w, const void *series)
+{
+    return bt_force_against(w, bt_force_series_find(series));
+}
+
+#define PLACE(at_, kind_) .of_world = at_place, .context = &(const place){offsetof(bt_world, at_), kind_}
+#define AT(at_, ...)                                                                                                   \
+    {PARTS(__VA_ARGS__), PLACE(at_, _Generic(((bt_world *)0)->at_, double: REAL, int64_t: WHOLE, bool: FLAG))}
+#define UNLESS(at_, ...) {PARTS(__VA_ARGS__), PLACE(at_, NO_FLAG)}
+#define FORCE(series_, ...) {PARTS(series_##_force, __VA_ARGS__), .of_world = bt_force_of, .context = #series_}
 
 const bt_quantity bt_own_series[] = {
     ROW(time, ALWAYS, LAST, "s", "simulated time at the end of the step"),
@@ -21,11 +57,11 @@ const bt_quantity bt_own_series[] = {
     ROW(ice_force_x, BODY, MEAN, "N", "contact force on the towed body, x, impulse / dt"),
     ROW(ice_force_y, BODY, MEAN, "N", "contact force on the towed body, y, impulse / dt"),
     ROW(ice_moment, BODY, MEAN, "N m", "contact moment on the towed body about its centroid, impulse / dt"),
-    SHOWN(drag_force, BODY, MEAN, "N",
+    FORCE(drag, BODY, MEAN, "N",
         "drag of water and air on the towed body against the tow direction", BALANCE, "drag", "mean_drag_force_n"),
-    SHOWN(coriolis_force, BODY, MEAN, "N",
+    FORCE(coriolis, BODY, MEAN, "N",
         "Coriolis force on the towed body against the tow direction", BALANCE, "Coriolis", "mean_coriolis_force_n"),
-    SHOWN(tilt_force, BODY, MEAN, "N",
+    FORCE(tilt, BODY, MEAN, "N",
         "force of the sea-surface tilt on the towed body against the tow direction",
         BALANCE, "tilt", "mean_tilt_force_n"),
     SHOWN(inertia_force, BODY, MEAN, "N",
@@ -60,50 +96,57 @@ const bt_quantity bt_own_series[] = {
     ROW(vessel_inertia, VESSEL, MEAN, "N",
         "(mass + added mass) x acceleration of the vessel along its course; NaN without a vessel"),
     ROW(vessel_line, VESSEL, MEAN, "N", "pull of the line on the vessel against its course; NaN without a vessel"),
-    ROW(current_x, ALWAYS, MEAN, "m/s", "current at the middle of the step, x"),
-    ROW(current_y, ALWAYS, MEAN, "m/s", "current at the middle of the step, y"),
-    ROW(wind_x, ALWAYS, MEAN, "m/s", "wind at the middle of the step, x"),
-    ROW(wind_y, ALWAYS, MEAN, "m/s", "wind at the middle of the step, y"),
-    SHOWN(contacts, ALWAYS, MEAN, "1", "contact points in the solver", DIAGNOSTIC, "contact points", "contacts_mean"),
+    AT(par.water_u, current_x, ALWAYS, MEAN, "m/s", "current at the middle of the step, x", NONE, NULL, NULL),
+    AT(par.water_v, current_y, ALWAYS, MEAN, "m/s", "current at the middle of the step, y", NONE, NULL, NULL),
+    AT(par.air_u, wind_x, ALWAYS, MEAN, "m/s", "wind at the middle of the step, x", NONE, NULL, NULL),
+    AT(par.air_v, wind_y, ALWAYS, MEAN, "m/s", "wind at the middle of the step, y", NONE, NULL, NULL),
+    AT(stats.n_points, contacts, ALWAYS, MEAN, "1",
+        "contact points in the solver", DIAGNOSTIC, "contact points", "contacts_mean"),
     ROW(contacts_body, ALWAYS, MEAN, "1", "contact points on the towed body"),
-    SHOWN(sweeps, ALWAYS, MEAN, "1", "sweeps of the contact solver in a step", DIAGNOSTIC, "sweeps", "mean_sweeps"),
-    SHOWN(unit_updates, ALWAYS, MEAN, "1",
+    AT(stats.sweeps, sweeps, ALWAYS, MEAN, "1",
+        "sweeps of the contact solver in a step", DIAGNOSTIC, "sweeps", "mean_sweeps"),
+    AT(stats.unit_updates, unit_updates, ALWAYS, MEAN, "1",
         "updates of single contacts by the sweeps of a step: a sweep leaves out contacts that bear no load "
         "and open", NONE, NULL, "mean_unit_updates"),
-    SHOWN(momentum_moves, ALWAYS, MEAN, "1",
+    AT(stats.unit_moves, momentum_moves, ALWAYS, MEAN, "1",
         "contacts moved on along their last change between the sweeps of a step", NONE, NULL, "mean_momentum_moves"),
-    SHOWN(residual_checks, ALWAYS, MEAN, "1",
+    AT(stats.residual_checks, residual_checks, ALWAYS, MEAN, "1",
         "residuals of single contacts that were taken in a step, and velocities formed anew for them; they count "
         "against the limit of work as updates do", NONE, NULL, "mean_residual_checks"),
-    ROW(position_sweeps, ALWAYS, MEAN, "1", "sweeps of the position projection in a step"),
-    SHOWN(position_updates, ALWAYS, MEAN, "1",
+    AT(stats.position_sweeps, position_sweeps, ALWAYS, MEAN, "1",
+        "sweeps of the position projection in a step", NONE, NULL, NULL),
+    AT(stats.position_updates, position_updates, ALWAYS, MEAN, "1",
         "updates of single contacts by the position projection of a step", NONE, NULL, "mean_position_updates"),
-    SHOWN(unprojected, ALWAYS, SUM, "1",
+    UNLESS(stats.projected, unprojected, ALWAYS, SUM, "1",
         "steps whose position projection met its limit of work", NONE, NULL, "unprojected_steps"),
-    SHOWN(residual, ALWAYS, MAX, "m/s",
+    AT(stats.residual, residual, ALWAYS, MAX, "m/s",
         "natural-map residual of the contact problem at the end of the step, largest component",
         DIAGNOSTIC, "residual", "max_residual_m_s"),
-    ROW(residual_rms, ALWAYS, MAX, "m/s", "the same residual, root mean square over the rows of all contacts"),
-    ROW(active, ALWAYS, LAST, "1", "floes in cells whose contacts were looked at; all others are at rest"),
-    SHOWN(unconverged, ALWAYS, SUM, "1",
+    AT(stats.residual_rms, residual_rms, ALWAYS, MAX, "m/s",
+        "the same residual, root mean square over the rows of all contacts", NONE, NULL, NULL),
+    AT(stats.n_active, active, ALWAYS, LAST, "1",
+        "floes in cells whose contacts were looked at; all others are at rest", NONE, NULL, NULL),
+    UNLESS(stats.converged, unconverged, ALWAYS, SUM, "1",
         "steps that met the limit of work before the tolerance", NONE, NULL, "unconverged_steps"),
-    SHOWN(locked, ALWAYS, SUM, "1",
+    AT(stats.locked, locked, ALWAYS, SUM, "1",
         "of these, steps in which some bodies could not give way to any load: their loads have no bound", NONE, NULL,
         "locked_steps"),
-    SHOWN(overlap, ALWAYS, MAX, "m",
+    AT(stats.overlap, overlap, ALWAYS, MAX, "m",
         "deepest overlap of two bodies at the start of the step; what was crushed or lies over each other by rafting "
         "is left out", DIAGNOSTIC, "deepest overlap", "max_overlap_m"),
-    SHOWN(momentum_residual, ALWAYS, MAX, "1",
+    AT(stats.momentum_residual, momentum_residual, ALWAYS, MAX, "1",
         "|momentum change - external impulse| / momentum exchanged in the step", NONE, NULL, "momentum_residual"),
-    ROW(kinetic_energy, ALWAYS, LAST, "J", "kinetic energy of all dynamic bodies, added mass included"),
-    SHOWN(contact_work, ALWAYS, SUM, "J", "work of the contact impulses", NONE, NULL, "contact_work_j"),
-    SHOWN(repeats, ALWAYS, SUM, "1",
+    AT(stats.kinetic_energy, kinetic_energy, ALWAYS, LAST, "J",
+        "kinetic energy of all dynamic bodies, added mass included", NONE, NULL, NULL),
+    AT(stats.contact_work, contact_work, ALWAYS, SUM, "J",
+        "work of the contact impulses", NONE, NULL, "contact_work_j"),
+    AT(stats.repeats, repeats, ALWAYS, SUM, "1",
         "times a step was detected and solved again because its solution outran the contact margin",
         NONE, NULL, "repeated_solves"),
-    SHOWN(outrun, ALWAYS, SUM, "1",
+    AT(stats.outrun, outrun, ALWAYS, SUM, "1",
         "steps whose last solution still outran the margin: a contact may have been met a step late",
         NONE, NULL, "outrun_steps"),
-    SHOWN(restitution_cut, ALWAYS, SUM, "1",
+    AT(stats.restitution_cut, restitution_cut, ALWAYS, SUM, "1",
         "steps whose restitution was lowered so that the contacts add no energy", NONE, NULL, "restitution_cut_steps"),
     SHOWN(collision_resistance, IMPACTS, MEAN, "N",
         "part of ice_resistance that belongs to collisions, impulse / dt; the rest is quasi-static; NaN if not told "
@@ -118,26 +161,7 @@ const bt_quantity bt_own_series[] = {
         "largest force of a floe on the towed body that is no collision, impulse / dt; NaN if not told apart",
         NONE, NULL, "impacts.largest_push_n"),
     ROW(moving, ALWAYS, LAST, "1", "floes faster than 1 % of the reference speed"),
-    SHOWN(crushing, ALWAYS, MEAN, "1",
-        "contact points that crush: their normal force is at the limit pressure x thickness x length",
-        NONE, NULL, "max_crushing_contacts"),
-    SHOWN(crushed_work, ALWAYS, SUM, "J", "work taken by contact points that crush", NONE, NULL, "crushed_work_j"),
-    SHOWN(crushed_depth, ALWAYS, MAX, "m",
-        "deepest crush of a pair of bodies in contact, or at rest beside each other",
-        NONE, NULL, "max_crushed_depth_m"),
-    SHOWN(rafting, ALWAYS, LAST, "1", "pairs of floes that lie over each other", NONE, NULL, "rafting_pairs"),
-    SHOWN(rafted_area, ALWAYS, LAST, "m2",
-        "area in which floes lie over each other, pair by pair, at the start of the step",
-        NONE, NULL, "rafted_area_m2"),
-    SHOWN(rafted_largest, ALWAYS, MAX, "m2", "the largest such area of one pair", NONE, NULL, "largest_rafted_pair_m2"),
-    SHOWN(rafted_energy, ALWAYS, LAST, "J",
-        "potential energy of floes that lie over each other, above that of floes side by side",
-        NONE, NULL, "rafted_energy_j"),
-    SHOWN(raft_edge_work, ALWAYS, SUM, "J",
-        "work taken by edges that raft: their load is at the bound; part of it is in rafted_energy, the rest is lost",
-        NONE, NULL, "raft_edge_work_j"),
-    SHOWN(raft_friction_work, ALWAYS, SUM, "J",
-        "work taken by friction between floes that lie over each other", NONE, NULL, "raft_friction_work_j"),
+    // here those of the contact laws: src/contact/crush.c, raft.c
     SHOWN(window_x, WINDOW, LAST, "m",
         "low end of the moving window, not wrapped; NaN where the domain stands still",
         NONE, NULL, "moving_window.x_m"),
@@ -151,7 +175,7 @@ const bt_quantity bt_own_series[] = {
 
 const int bt_n_own_series = sizeof bt_own_series / sizeof *bt_own_series;
 
-_Static_assert(sizeof bt_own_series / sizeof *bt_own_series == offsetof(bt_sample, added) / sizeof(double),
+_Static_assert(sizeof bt_own_series / sizeof *bt_own_series == offsetof(bt_sample, laws) / sizeof(double),
                "every number of a sample has its row in the table");
 _Static_assert(sizeof bt_own_series / sizeof *bt_own_series <= BT_COST_SERIES + 8,
                "what check says of the disk counts them");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a world as named arrays; what belongs to it, and what does not, is listed in bergtow/checkpoint.h.
+// The state of a world as named arrays; what belongs to it, and what does not, is listed in output/checkpoint.h.
 #ifndef BT_STATE_H
 #define BT_STATE_H
 

@@ -23,7 +23,6 @@
 #define OVERLAP_LIMIT 0.01
 /// Crush above this fraction of it is reported: outlines stay as they were, and floes that have gone so far into each
 /// other part sideways.
-#define CRUSH_LIMIT 0.3
 
 static int ascending(const void *a, const void *b)
 {
@@ -176,11 +175,12 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
                       "solver.position_sweeps",
                       h->max_overlap, 100 * h->max_overlap / t->mean_size);
-    if (!(h->max_crushed_depth <= CRUSH_LIMIT * t->mean_size))
-        bt_errors_add(&s->warnings,
-                      "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses "
-                      "stay as they were, which is no model of that",
-                      h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
+    for (int law = 0; law < BT_LAWS; law++) {
+        if (!bt_laws[law]->doubt) continue;
+        char *doubt = bt_laws[law]->doubt(h->laws + bt_law_first_total(law), t->mean_size);
+        if (doubt) bt_errors_add(&s->warnings, "%s", doubt);
+        free(doubt);
+    }
     if (t->stall.windows)
         bt_errors_add(
             &s->warnings,

@@ -10,6 +10,7 @@
 
 #include "output/estimate_text.h"
 #include "output/impact_report.h"
+#include "contact/raft.h"
 #include "step/window.h"
 
 typedef bt_summary_view view;
@@ -34,7 +35,8 @@ static double overlap_relative(const view *v)
 
 static double rafted_share(const view *v)
 {
-    return v->t->ice_area > 0 ? v->h->rafted_area / v->t->ice_area : 0;
+    const double area = v->h->laws[bt_law_first_total(BT_LAW_RAFTING) + BT_RAFT_TOTAL_AREA].real;
+    return v->t->ice_area > 0 ? area / v->t->ice_area : 0;
 }
 
 static const bt_lead_stats *lead(const view *v) { return &v->t->lead; }
@@ -190,7 +192,7 @@ static void write_warnings(bt_json *j, const char *key, const view *v, const voi
     OF_SUMMARY("mean_" key_ "_low_n", member.low, "N", "lower end of its 95 % interval"), \
     OF_SUMMARY("mean_" key_ "_high_n", member.high, "N", "upper end of its 95 % interval")
 
-const bt_json_key bt_summary_keys[] = {
+static const bt_json_key rows[] = {
     OF_CASE("title", run.title, "", "title of the case"),
     TEXT("version", version, "version of the program"),
     COUNT("n_floes", n_floes, "1", "floes"),
@@ -353,20 +355,9 @@ const bt_json_key bt_summary_keys[] = {
     OF_HISTORY("unprojected_steps", unprojected, "1", "steps whose position projection met its limit of work"),
     OF_SUMMARY("contacts_mean", contacts, "1", "contact points, mean over all steps"),
     OF_HISTORY("contact_work_j", contact_work, "J", "work of the contact impulses"),
-    OF_HISTORY("crushed_work_j", crushed_work, "J", "work taken by contact points that crush"),
-    OF_HISTORY("max_crushed_depth_m", max_crushed_depth, "m", "deepest crush of a pair of bodies"),
-    OF_HISTORY("crushing_steps", crushing_steps, "1", "steps with contact points that crush"),
-    OF_HISTORY("max_crushing_contacts", max_crushing, "1", "most of them at once"),
-    OF_HISTORY("rafting_pairs", rafting, "1", "pairs of floes that lie over each other, at the end"),
-    OF_HISTORY("rafted_area_m2", rafted_area, "m2", "area in which they do, pair by pair, at the end"),
-    NUMBER("rafted_share_of_ice", rafted_share, "1", "the same over the area of all ice"),
-    OF_HISTORY("max_rafted_area_m2", max_rafted_area, "m2", "the largest such area of a step"),
-    OF_HISTORY("largest_rafted_pair_m2", rafted_largest, "m2", "the largest area of one pair"),
-    OF_HISTORY("rafted_energy_j", rafted_energy, "J",
-        "potential energy of floes that lie over each other, above that of floes side by side, at the end"),
-    OF_HISTORY("raft_edge_work_j", raft_edge_work, "J", "work taken by edges that raft"),
-    OF_HISTORY("raft_friction_work_j", raft_friction_work, "J",
-        "work taken by friction between floes that lie over each other"),
+    {.kind = BT_JSON_LAWS}, // the totals of the contact laws: src/contact/crush.c, raft.c
+    NUMBER("rafted_share_of_ice", rafted_share, "1",
+        "area in which floes lie over each other at the end, over the area of all ice"),
     OF_TOTALS("stalled_s", stall.time, "s", "time in which the body stood still while the tow asked for motion"),
     OF_TOTALS("stalled_windows", stall.windows, "1", "stretches of time in which it did"),
     OF_HISTORY("positive_work_steps", positive_work, "1", "steps in which the contacts added energy"),
@@ -409,7 +400,32 @@ const bt_json_key bt_summary_keys[] = {
     COUNT("n_events", n_events, "1", "how many there were"),
     WRITTEN("warnings", write_warnings, "doubts about the numbers, in words"),
 };
-const int bt_n_summary_keys = sizeof bt_summary_keys / sizeof *bt_summary_keys;
+
+/// The totals of the contact laws as keys.
+static int keys_of_laws(bt_json_key *key)
+{
+    int i = 0;
+    for (int law = 0; law < BT_LAWS; law++)
+        for (int j = 0; j < bt_laws[law]->n_totals; j++, i++) {
+            const bt_law_total *t = &bt_laws[law]->totals[j];
+            key[i] = (bt_json_key){.key = t->key, .units = t->units, .description = t->description,
+                                   .kind = t->rule == BT_TOTAL_STEPS ? BT_JSON_INT : BT_JSON_REAL, .from = FROM_HISTORY,
+                                   .offset = offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value)};
+        }
+    return i;
+}
+
+const bt_json_key *bt_summary_keys(int *n)
+{
+    static bt_json_key keys[sizeof rows / sizeof *rows + BT_MAX_LAW_TOTALS];
+    static int made;
+    for (size_t k = 0, ready = made > 0; !ready && k < sizeof rows / sizeof *rows; k++) {
+        if (rows[k].kind == BT_JSON_LAWS) made += keys_of_laws(keys + made);
+        else keys[made++] = rows[k];
+    }
+    *n = made;
+    return keys;
+}
 
 #define OF_REPORTED(...) {BT_JSON_AT(0, bt_reported, __VA_ARGS__)}
 const bt_json_key bt_reported_keys[] = {
@@ -432,16 +448,25 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     const void *const source[N_FROM] = {s, h, t, c, t->window, s->impacts};
     bt_json j = {0};
     bt_json_open(&j, NULL, '{');
-    bt_json_keys_write(&j, bt_summary_keys, bt_n_summary_keys, &v, source);
+    int n_keys;
+    const bt_json_key *keys = bt_summary_keys(&n_keys);
+    bt_json_keys_write(&j, keys, n_keys, &v, source);
     bt_json_close(&j, '}');
     return j.text;
+}
+
+static const bt_json_key *find(const char *key)
+{
+    int n;
+    const bt_json_key *keys = bt_summary_keys(&n);
+    return bt_json_keys_find(keys, n, key);
 }
 
 bt_status bt_summary_check_added(bt_errors *err)
 {
     const size_t before = err->n;
     for (int k = 0; k < bt_n_added(); k++)
-        if (bt_json_keys_find(bt_summary_keys, bt_n_summary_keys, bt_added(k)->summary))
+        if (find(bt_added(k)->summary))
             bt_errors_add(err, "quantity %s: its key %s is one of the summary's own; choose another name",
                           bt_added(k)->name, bt_added(k)->summary);
     return err->n > before ? BT_ERR_USAGE : BT_OK;
@@ -490,6 +515,5 @@ bt_meaning bt_summary_meaning(const char *key)
     const char *dot = strrchr(key, '.');
     if (!strncmp(key, "window.series.", 14))
         return meaning_of(bt_json_keys_find(bt_reported_keys, bt_n_reported_keys, dot + 1));
-    bt_meaning m = meaning_of(bt_json_keys_find(bt_summary_keys, bt_n_summary_keys, key));
-    return m;
+    return meaning_of(find(key));
 }

@@ -18,8 +18,8 @@ typedef struct bt_summary_view {
 /// Is the key of a registered quantity one that the summary has already? Errors: BT_ERR_USAGE, with the name to change.
 bt_status bt_summary_check_added(bt_errors *err);
 
-extern const bt_json_key bt_summary_keys[];
-extern const int bt_n_summary_keys;
+/// Its n rows, in the order of the file.
+const bt_json_key *bt_summary_keys(int *n);
 extern const bt_json_key bt_reported_keys[]; ///< of an entry of window.series
 extern const int bt_n_reported_keys;
 

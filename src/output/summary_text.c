@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "output/estimate_text.h"
@@ -140,14 +141,12 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
            t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
     printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);
-    if (c->ice.crushing_pressure > 0)
-        printf("  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n",
-               h->crushed_work, (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
-    if (c->ice.rafting_kappa > 0)
-        printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J "
-               "of it in the sheets' height, friction between sheets %.4g J\n",
-               h->rafted_area, t->ice_area > 0 ? 100 * h->rafted_area / t->ice_area : 0.0, h->rafting,
-               h->raft_edge_work, h->rafted_energy, h->raft_friction_work);
+    for (int law = 0; law < BT_LAWS; law++) {
+        char *line =
+            bt_laws[law]->result ? bt_laws[law]->result(c, h->laws + bt_law_first_total(law), t->ice_area) : NULL;
+        if (line) fputs(line, stdout);
+        free(line);
+    }
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);

@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "case/case_derived.h"
 #include "case/cost.h"

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "bergtow/ensemble.h"
 #include "base/fileio.h"
 

@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "base/fileio.h"
 #include "base/checksum.h"
 

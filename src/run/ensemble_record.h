@@ -52,4 +52,8 @@ bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *na
 /// Take record and files of a member away, so that it is run anew; the caller holds its lock. Errors: BT_ERR_IO.
 bt_status bt_member_record_forget(const char *folder, bt_errors *err);
 
+/// Make DIR/ensemble.h5 from the files of the members that are sound by these records; the caller holds DIR/lock.
+/// Errors: BT_ERR_IO.
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err);
+
 #endif

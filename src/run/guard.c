@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Guards of a run; what they look at is in guard.h.
 #include "run/guard.h"
+#include "base/inside.h"
 
 #include <inttypes.h>
 #include <math.h>

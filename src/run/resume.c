@@ -7,7 +7,7 @@
 
 #include "base/fileio.h"
 #include "base/lock.h"
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "output/folder.h"
 #include "revision.h"
 #include "run/run_parts.h"

@@ -6,7 +6,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "output/folder.h"
 #include "base/lock.h"
 #include "run/run_parts.h"

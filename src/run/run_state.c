@@ -6,7 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "partition/domain.h"
 #include "base/largest.h"
 #include "revision.h"

@@ -13,7 +13,7 @@
 #include <sys/resource.h>
 #include <time.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "contact/contacts.h"
 #include "bergtow/estimate.h"
 #include "loads/impact.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Builds the world of a case; every derived mass, drag and frame term is formed here and nowhere else.
-#include "bergtow/setup.h"
+#include "run/setup.h"
+#include "base/inside.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,11 +11,11 @@
 #include "contact/contacts.h"
 #include "force/drift.h"
 #include "force/environment.h"
-#include "bergtow/forces.h"
+#include "force/forces.h"
 #include "loads/impact.h"
 #include "tow/tow.h"
 #include "step/window.h"
-#include "contact/added.h"
+#include "contact/law.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
 #include "run/setup_tow.h"
@@ -33,7 +34,6 @@ bt_params bt_setup_params(const bt_case *c, double size)
     double water[2], air[2]; // at time zero; where they change, each step sets its own
     bt_environment_at(c, true, 0, water);
     bt_environment_at(c, false, 0, air);
-    const double rise = bt_case_rise(c->ice.density, c->water.density);
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -51,11 +51,6 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
-        .crush_pressure = c->ice.crushing_pressure,
-        .crush_least = c->ice.crushing_least,
-        .raft_line = c->ice.rafting_kappa * 0.5 * rise,
-        .raft_sheet = (c->water.density - c->ice.density) * BT_GRAVITY,
-        .raft_rise = rise,
         .water_u = water[0],
         .water_v = water[1],
         .air_u = air[0],
@@ -70,7 +65,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         p.tilt_ax = -BT_GRAVITY * c->water.slope_x;
         p.tilt_ay = -BT_GRAVITY * c->water.slope_y;
     }
-    bt_added_setup(c, p.added_own);
+    bt_laws_setup(c, &p);
     return p;
 }
 
@@ -454,11 +449,4 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     // all have just been looked at: what rests needs no first step to show it
     memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     return BT_OK;
-}
-
-void bt_roster_free(bt_roster *r)
-{
-    free(r->thickness);
-    free(r->names);
-    *r = (bt_roster){0};
 }

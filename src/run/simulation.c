@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/lock.h"
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "bergtow/quantity.h"
 #include "output/folder.h"
 #include "output/quantity_list.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Passes over the active cells by threads, with the exchange between ranks under way.
 #include "space/phases.h"
+#include "base/inside.h"
 
 #include <omp.h>
 #include <stdatomic.h>

@@ -29,7 +29,7 @@
 #include "bergtow/world.h"
 
 enum {
-    BT_MAX_TOTALS = 24,
+    BT_MAX_TOTALS = 28,
     /// fewer contacts are swept faster by one thread: threads have to meet, which takes some microseconds
     BT_FEW_CONTACTS = 700,
 };

@@ -4,11 +4,12 @@
 #include <string.h>
 
 #include "contact/work.h"
+#include "base/inside.h"
 #include "contact/contacts.h"
 #include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
-#include "bergtow/forces.h"
+#include "force/forces.h"
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
-#include "bergtow/forces.h"
+#include "force/forces.h"
 #include "space/cells.h"
 #include "tow/tow.h"
 #include "partition/domain.h"

@@ -7,7 +7,7 @@
 
 #include "body/bodies.h"
 #include "force/environment.h"
-#include "bergtow/forces.h"
+#include "force/forces.h"
 #include "loads/impact.h"
 #include "partition/domain.h"
 #include "solve/solver.h"

@@ -8,7 +8,7 @@
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "space/cells.h"
 #include "bergtow/world.h"
 #include "case/case_check.h"

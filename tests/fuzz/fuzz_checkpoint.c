@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "loads/impact.h"
 #include "output/observe.h"
 #include "partition/domain.h"

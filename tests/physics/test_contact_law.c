@@ -21,7 +21,7 @@ static bt_world *hull_and_floe(double dt, double turn, double speed, double slop
 {
     bt_params p = scene_params(dt, 1);
     p.tilt_ax = slope;
-    p.added_own[0][LOAD] = soft, p.added_own[0][STIFFNESS] = stiff;
+    p.law_own[BT_LAWS][LOAD] = soft, p.law_own[BT_LAWS][STIFFNESS] = stiff;
     bt_world *w = bt_world_create(&p);
     double v[8];
     scene_square(1, v);
@@ -93,11 +93,12 @@ static void the_weaker_law_yields(void **state)
     (void)state;
     for (int i = 0; i < 2; i++) {
         bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
-        w->par.crush_pressure = i ? 5e6 : 300, w->par.crush_least = 0.01;
+        double *own = w->par.law_own[BT_LAW_CRUSHING];
+        own[BT_CRUSH_PRESSURE] = i ? 5e6 : 300, own[BT_CRUSH_LEAST] = 0.01;
         double crushed = 0;
         for (int s = 0; s < 1000; s++) {
             bt_world_step(w);
-            crushed += w->stats.crushed_work;
+            crushed += scene_law(w, "crushed_work");
         }
         const double energy = 0.5 * sheet * 0.25;
         assert_true(i ? pressed(w) > 0.1 && crushed < 0.05 * energy : pressed(w) == 0 && crushed > 0.2 * energy);
@@ -161,6 +162,20 @@ static void what_will_not_do_is_refused(void **state)
     assert_int_equal(bt_n_contact_laws(), 1);
 }
 
+/// The arrays that hold them have room, and each series names a total of the summary.
+static void numbers_of_the_laws_have_their_places(void **state)
+{
+    (void)state;
+    assert_true(bt_law_first_number(BT_LAWS) <= BT_MAX_LAW_NUMBERS && bt_law_first_total(BT_LAWS) <= BT_MAX_LAW_TOTALS);
+    for (int law = 0; law < BT_LAWS; law++) {
+        const bt_law *l = bt_laws[law];
+        bool summed[BT_MAX_LAW_NUMBERS] = {false};
+        for (int k = 0; k < l->n_totals; k++)
+            summed[l->totals[k].number] |= !strcmp(l->numbers[l->totals[k].number].key, l->totals[k].key);
+        for (int k = 0; k < l->n_numbers; k++) assert_true(summed[k]);
+    }
+}
+
 int main(void)
 {
     bt_errors err = {0};
@@ -170,6 +185,7 @@ int main(void)
         cmocka_unit_test(it_is_the_hull_s_alone),        cmocka_unit_test(the_weaker_law_yields),
         cmocka_unit_test(a_state_of_other_laws_is_refused),
         cmocka_unit_test(what_will_not_do_is_refused),
+        cmocka_unit_test(numbers_of_the_laws_have_their_places),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,6 +2,7 @@
 // Form drag along the outline against plain sums, width and hull; no reversal at any step; added mass; free drift that
 // stays.
 #include "scene.h"
+#include "force/forces.h"
 
 #include "force/drift.h"
 #include "step/window.h"

@@ -8,6 +8,7 @@
 // of floes without asking laws that are added; the column of the law not in the checkpoint; the wrapped place of the
 // towed body.
 #include "scene.h"
+#include "force/forces.h"
 
 #include <stdio.h>
 #include <unistd.h>
@@ -15,7 +16,7 @@
 #include "base/h5read.h"
 #include "base/checksum.h"
 #include "bergtow/run.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "force/drift.h"
 #include "output/observe.h"
 #include "step/window.h"

@@ -20,7 +20,8 @@ static bt_params params(double dt)
     bt_params p = scene_params(dt, 10);
     p.slop = 0.01;
     p.tolerance = 1e-8;
-    p.raft_line = kappa * 0.5 * rise(), p.raft_rise = rise(), p.raft_sheet = (water - ice) * gravity;
+    double *own = p.law_own[BT_LAW_RAFTING];
+    own[BT_RAFT_LINE] = kappa * 0.5 * rise(), own[BT_RAFT_RISE] = rise(), own[BT_RAFT_SHEET] = (water - ice) * gravity;
     return p;
 }
 
@@ -69,7 +70,7 @@ static void check_step(const bt_world *w)
     assert_true(st->converged);
     assert_true(st->momentum_residual < 1e-9);
     assert_true(st->contact_work <= 1e-6 * (1 + fabs(st->contact_work)));
-    assert_true(st->raft_edge_work >= 0 && st->raft_friction_work >= -1e-9);
+    assert_true(scene_law(w, "raft_edge_work") >= 0 && scene_law(w, "raft_friction_work") >= -1e-9);
 }
 
 /// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more
@@ -93,15 +94,15 @@ static void two_squares(void **state)
         const double f = load_on(w, right);
         depth = 0.5 * a - pose(w, floe)->x;
         if (depth > 0) work += f * v * dt;
-        edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+        edge += scene_law(w, "raft_edge_work"), friction += scene_law(w, "raft_friction_work");
         if (depth > 0.1) CHECK_CLOSE(f, a * (edge_load() + sheet_load() * (depth - v * dt)), 0.002 * f);
-        if (depth > 0.1) CHECK_CLOSE(w->stats.rafted_area, a * (depth - v * dt), 1e-6 * a);
+        if (depth > 0.1) CHECK_CLOSE(scene_law(w, "rafted_area"), a * (depth - v * dt), 1e-6 * a);
         assert_true(w->stats.overlap < 0.02);
     }
     CHECK_CLOSE(edge, edge_load() * a * depth, 0.01 * edge);
     CHECK_CLOSE(friction, 0.5 * sheet_load() * a * depth * depth, 0.01 * friction);
     CHECK_CLOSE(edge + friction, work, 0.01 * work);
-    CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * a * depth, 0.01 * w->stats.rafted_energy);
+    CHECK_CLOSE(scene_law(w, "rafted_energy"), rise() * h * h * a * depth, 0.01 * scene_law(w, "rafted_energy"));
     CHECK_CLOSE(pose(w, floe)->y, 0, 2e-4); // such sides do not push
     // Back: friction alone.
     set_speed(w, right, 0.08);
@@ -114,7 +115,7 @@ static void two_squares(void **state)
         depth = 0.5 * a - pose(w, floe)->x;
         if (touched > 3)
             CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
-        if (touched > 3) assert_true(w->stats.raft_edge_work == 0);
+        if (touched > 3) assert_true(scene_law(w, "raft_edge_work") == 0);
         touched += load_on(w, left) > 0;
     }
     assert_true(deepest - depth > 2);
@@ -158,7 +159,7 @@ static void out_behind(void **state)
         }
         if (x < -2.6 && x > -5.4) CHECK_CLOSE(f, 2 * sheet_load() * (x + 1.5 + a + v * dt), 0.01 * f + 2);
         if (x < -5.6) {
-            assert_true(w->stats.n_rafting == 0 && w->stats.rafted_area == 0);
+            assert_true(scene_law(w, "rafting") == 0 && scene_law(w, "rafted_area") == 0);
             parted = true;
         }
     }
@@ -232,7 +233,7 @@ static void apex_under_an_edge(void **state)
         if (in < 0.05) continue;
         const double length = bt_max(h, 2 * in * slope);
         CHECK_CLOSE(f, edge_load() * length + sheet_load() * in * in * slope, 0.002 * f);
-        assert_true(w->stats.n_rafting == 1); // not floe and hull
+        assert_true(scene_law(w, "rafting") == 1); // not floe and hull
     }
     bt_world_free(w);
 }
@@ -264,12 +265,13 @@ static void plough_in_a_channel(void **state)
         check_step(w);
         way += v * dt;
         work += load_on(w, plough) * v * dt;
-        edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+        edge += scene_law(w, "raft_edge_work"), friction += scene_law(w, "raft_friction_work");
     }
     CHECK_CLOSE(edge + friction, work, 0.02 * work);
-    CHECK_CLOSE(w->stats.rafted_area, width * way, 0.02 * width * way);
+    CHECK_CLOSE(scene_law(w, "rafted_area"), width * way, 0.02 * width * way);
     CHECK_CLOSE(edge, edge_load() * width * way, 0.03 * edge);
-    CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * w->stats.rafted_area, 1e-9 * w->stats.rafted_energy);
+    CHECK_CLOSE(scene_law(w, "rafted_energy"), rise() * h * h * scene_law(w, "rafted_area"),
+                1e-9 * scene_law(w, "rafted_energy"));
     bt_world_free(w);
 }
 
@@ -296,13 +298,14 @@ static void energy_is_booked(void **state)
             bt_world_step(w);
             check_step(w);
             if (s == 0) before = w->stats.kinetic_energy - w->stats.contact_work;
-            all += w->stats.contact_work, edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+            all += w->stats.contact_work, edge += scene_law(w, "raft_edge_work");
+            friction += scene_law(w, "raft_friction_work");
             CHECK_CLOSE(w->stats.kinetic_energy, before + all, 1e-6 * before);
             assert_true(w->stats.overlap < 0.05);
         }
         assert_true(edge + friction <= -all * (1 + 1e-6) + 1e-6);
-        rafted += w->stats.n_rafting > 0;
-        if (w->stats.rafted_area > 1) assert_true(edge > 0 && friction > 0);
+        rafted += scene_law(w, "rafting") > 0;
+        if (scene_law(w, "rafted_area") > 1) assert_true(edge > 0 && friction > 0);
         bt_world_free(w);
     }
     assert_true(rafted > 10);

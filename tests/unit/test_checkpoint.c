@@ -18,10 +18,11 @@
 // cmocka.h wants setjmp.h, stdarg.h, stddef.h and stdint.h first
 #include <cmocka.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
+#include "law_number.h"
 #include "loads/impact.h"
 #include "output/observe.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
@@ -236,8 +237,8 @@ static int seen_in(const bt_world *w)
     for (int64_t k = 0; k < w->events.n; k++)
         seen |= w->events.event[k].kind == BT_EVENT_LINE_BROKEN ? BREAKS : WAYPOINT;
     if (w->window && w->window->renewed > 0) seen |= RENEWS;
-    if (w->stats.n_crushing > 0) seen |= CRUSHES;
-    if (w->stats.n_rafting > 0 && w->stats.raft_friction_work > 0) seen |= RAFTS;
+    if (scene_law(w, "crushing") > 0) seen |= CRUSHES;
+    if (scene_law(w, "rafting") > 0 && scene_law(w, "raft_friction_work") > 0) seen |= RAFTS;
     if (w->impacts && w->impacts->n_closed + w->impacts->n_open > 0) seen |= COLLIDES;
     if (w->cells->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {

@@ -8,7 +8,7 @@
 #include "contact/contacts.h"
 #include "loads/impact.h"
 #include "output/observe.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "space/cells.h"
 #include "step/window.h"
 #include "run/guard.h"
@@ -451,7 +451,7 @@ static void overlap_of_the_last_state_is_that_of_the_next_step(void **state)
         double deepest = 0;
         bt_params p = scene_params(0.1, 1);
         p.position_sweeps = 1, p.max_sweeps = 3, p.slop = 1e-6;
-        p.crush_pressure = crush ? 1e3 : 0, p.crush_least = 1;
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = crush ? 1e3 : 0, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 1;
         bt_world *w = bt_world_create(&p);
         double v[8];
         uint64_t seed = 7;

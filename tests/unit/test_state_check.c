@@ -19,10 +19,10 @@
 #include <hdf5.h>
 #include <math.h>
 
-#include "bergtow/checkpoint.h"
+#include "output/checkpoint.h"
 #include "loads/impact.h"
 #include "bergtow/run.h"
-#include "bergtow/setup.h"
+#include "run/setup.h"
 #include "space/cells.h"
 #include "step/window.h"
 #include "base/fileio.h"

@@ -101,7 +101,7 @@ static void everything_wrong(bt_sample *s, int i)
     s->contact_work = i % 5 == 0 ? 1 : -1;
     s->repeats = i % 4 == 0 ? 3 : 0;
     s->overlap = 0.1;
-    s->crushed_depth = 0.9;
+    bt_sample_set(s, bt_series_find("crushed_depth"), 0.9);
     s->momentum_residual = 1e-3;
     s->tow_force += 100;
     s->ice_resistance_budget -= 7;

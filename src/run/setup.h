@@ -6,26 +6,11 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-/// What the recorder wants to know of the bodies beside their outlines.
-typedef struct bt_roster {
-    bt_idx n_floes;         ///< generated or read, then given by hand
-    double *thickness;      ///< [n bodies] m; draft + sail of the towed body, 0 for walls
-    const char **names;     ///< [n bodies − n_floes]
-    double mean_size;       ///< mean equivalent diameter of the floes, m
-    bt_idx n_free;          ///< floes generated or read, which move freely; those given by hand may be fixed
-} bt_roster;
+#include "output/roster.h"
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
 /// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_roster *r, bt_errors *err);
-
-/// Release what a roster holds.
-void bt_roster_free(bt_roster *r);
 
 /// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed
 /// body into body, m/s; NaN where ice.start, the tow or a velocity that is given has it otherwise.
@@ -33,9 +18,5 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
 
 /// Constants of the step from the case. size: mean floe size, m.
 bt_params bt_setup_params(const bt_case *c, double size);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

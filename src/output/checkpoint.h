@@ -64,10 +64,6 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 struct bt_snapshot;
 
 #define BT_CHECKPOINT_FILE "checkpoint.h5"
@@ -100,9 +96,5 @@ bt_status bt_checkpoint_print(const char *path, bt_errors *err);
 /// Compare two checkpoints; *difference: the first, in words, NULL = none. The caller frees it. Errors as for
 /// bt_checkpoint_read: a difference is none.
 bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference, bt_errors *err);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// What all of the program use of src/base/base.c and others have no use for.
+#ifndef BERGTOW_INSIDE_H
+#define BERGTOW_INSIDE_H
+
+/// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
+/// parallel loop.
+#ifdef BT_VALIDATE
+#define BT_MANY(n, few) ((n) >= 0 && (few) >= 0)
+#else
+#define BT_MANY(n, few) ((n) > (few))
+#endif
+
+/// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
+void bt_leave_by(void (*by)(int code));
+
+#endif
