@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // A dataset whose rows are written by all ranks, each its own.
 //
-// On one rank rows go through HDF5, in chunks of at most 256 kB that are shuffled and deflated. On several, HDF5 has the
-// file open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill
-// values), says where the rows lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
+// On one rank rows go through HDF5, in chunks of at most 256 kB, shuffled and deflated. On several, HDF5 has the file
+// open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill values),
+// says where the rows lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
 //
 // Rejected: HDF5's own parallel driver. It must keep one copy of all metadata a rank, and each change of it is
 // collective. A write that fails on one rank (full disk, quota) leaves the others waiting inside the library or inside

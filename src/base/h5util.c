@@ -198,8 +198,9 @@ static hid_t layout(const bt_h5 *h, int rank, const hsize_t *chunk, bool packed)
 /// How a dataset is open. A packed chunk is written whole, once: HDF5 would keep those of each dataset, to 1 MB.
 static hid_t opened(bool packed)
 {
+    if (!packed) return H5P_DEFAULT;
     const hid_t p = H5Pcreate(H5P_DATASET_ACCESS);
-    if (packed) H5Pset_chunk_cache(p, H5D_CHUNK_CACHE_NSLOTS_DEFAULT, 0, H5D_CHUNK_CACHE_W0_DEFAULT);
+    H5Pset_chunk_cache(p, H5D_CHUNK_CACHE_NSLOTS_DEFAULT, 0, H5D_CHUNK_CACHE_W0_DEFAULT);
     return p;
 }
 
@@ -211,7 +212,7 @@ hid_t bt_h5_dataset(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
                 access = opened(chunk > 0);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h, d >= 0);
-    H5Pclose(access);
+    if (access != H5P_DEFAULT) H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;
@@ -286,7 +287,7 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
                 access = opened(packed);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h, d >= 0);
-    H5Pclose(access);
+    if (access != H5P_DEFAULT) H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;

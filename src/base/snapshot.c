@@ -26,7 +26,7 @@ void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int
     bt_item *i = &s->item[s->n++];
     *i = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
     s->rows = 0;
-    if (s->file) bt_snapshot_file_begin(s, i);
+    if (s->sink) s->sink->begin(s);
     else i->data = bt_alloc(bytes_of(i), 1);
     return i->data;
 }
@@ -35,7 +35,7 @@ void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows)
 {
     const bt_item *i = &s->item[s->n - 1];
     const size_t row = (size_t)i->width * bt_item_size(i->type);
-    if (s->file) bt_snapshot_file_put(s, i, n, rows);
+    if (s->sink) s->sink->put(s, n, rows);
     else if (n > 0) memcpy((char *)i->data + (size_t)s->rows * row, rows, (size_t)n * row);
     s->rows += n;
 }
@@ -70,7 +70,7 @@ void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row 
 
 void bt_snapshot_free(bt_snapshot *s)
 {
-    bt_snapshot_drop(s);
+    if (s->sink) s->sink->drop(s);
     for (int k = 0; k < s->n; k++) {
         free(s->item[k].name);
         free(s->item[k].data);

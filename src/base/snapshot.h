@@ -3,8 +3,10 @@
 //
 // Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows
 // what the arrays mean. A set that is read lies in memory. One that is saved goes to its file array by array: the state
-// of a run is never there twice. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it
-// took: they are not part of it, and are not compared.
+// of a run is never there twice.
+//
+// Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it took: they are not
+// part of it, and are not compared.
 #ifndef BT_SNAPSHOT_H
 #define BT_SNAPSHOT_H
 
@@ -37,8 +39,16 @@ typedef struct bt_snapshot {
     bt_errors *err;   ///< where bt_snapshot_take complains
     bool faulty;      ///< it has
     int64_t rows;     ///< put into the array that was added last
-    struct bt_snapshot_file *file; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
+    const struct bt_snapshot_sink *sink; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
+    struct bt_snapshot_file *file;       ///< of the sink
 } bt_snapshot;
+
+/// What takes the arrays of a set in place of memory.
+typedef struct bt_snapshot_sink {
+    void (*begin)(bt_snapshot *s); ///< the array added last
+    void (*put)(bt_snapshot *s, int64_t n, const void *rows); ///< the next rows of it
+    void (*drop)(bt_snapshot *s); ///< the set is given up: nothing of it stays
+} bt_snapshot_sink;
 
 /// A member of a struct that is saved.
 typedef struct bt_state_row {
@@ -52,7 +62,8 @@ size_t bt_item_size(bt_item_type type); ///< bytes of one number
 /// number `at` of an array in digits that give it back; returns out
 const char *bt_item_number(const bt_item *i, int64_t at, char out[40]);
 
-/// Add an array [n][width], to be filled by bt_snapshot_put. Returns where it lies, zeros; NULL in a file.
+/// Add an array [n][width], to be filled by bt_snapshot_put, once at least. Returns where it lies, zeros; NULL in a
+/// file.
 void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width);
 /// The next n rows of the array added last.
 void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows);
@@ -98,12 +109,6 @@ void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meani
 void bt_snapshot_end(bt_snapshot *s, bt_errors *err);
 /// The same, unless it has been, and the file stays: without this call bt_snapshot_free removes it. Errors: BT_ERR_IO.
 bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err);
-/// Remove the file of a set that is given up.
-void bt_snapshot_drop(bt_snapshot *s);
-/// Array i, the last one, in the file, and the next n rows of it.
-void bt_snapshot_file_begin(bt_snapshot *s, const bt_item *i);
-void bt_snapshot_file_put(bt_snapshot *s, const bt_item *i, int64_t n, const void *rows);
-
 /// A file in memory. Errors as bt_checksum_check, and BT_ERR_IO.
 bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
 

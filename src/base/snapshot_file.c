@@ -46,11 +46,23 @@ struct bt_snapshot_file {
     bt_status status; ///< of the whole, then
 };
 
-void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
+/// Some rows, or all at once, which takes HDF5 a third of the calls.
+static void put_rows(bt_snapshot *s, int64_t n, const void *rows)
 {
-    struct bt_snapshot_file *f = s->file = bt_alloc(1, sizeof *f);
-    *f = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
-    if (bt_h5_create_with_room(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
+    struct bt_snapshot_file *f = s->file;
+    const bt_item *i = &s->item[s->n - 1];
+    const hsize_t size[] = {(hsize_t)i->n, (hsize_t)i->width};
+    char name[160];
+    snprintf(name, sizeof name, "/%s", i->name);
+    if (i->type == BT_ITEM_TEXT) {
+        bt_h5_write_text(&f->h, name, rows);
+    } else if (n == i->n) {
+        bt_h5_write(&f->h, name, memory_type(i->type), size[0], i->width > 1 ? size[1] : 0, rows);
+    } else {
+        if (s->rows == 0)
+            f->dataset = bt_h5_dataset(&f->h, name, memory_type(i->type), i->width > 1 ? 2 : 1, size, 0);
+        bt_h5_write_rows(&f->h, f->dataset, memory_type(i->type), false, 0, (hsize_t)s->rows, (hsize_t)n, rows);
+    }
 }
 
 /// The array added last has all its rows.
@@ -69,27 +81,12 @@ static void end_array(bt_snapshot *s)
     bt_h5_attr_text(&f->h, name, "long_name", text);
 }
 
-void bt_snapshot_file_begin(bt_snapshot *s, const bt_item *i)
+static void begin_array(bt_snapshot *s)
 {
-    struct bt_snapshot_file *f = s->file;
     s->n--;
     end_array(s);
     s->n++;
-    enter(&f->h, s, s->n - 1);
-    char name[160];
-    snprintf(name, sizeof name, "/%s", i->name);
-    if (i->type != BT_ITEM_TEXT)
-        f->dataset = bt_h5_dataset(&f->h, name, memory_type(i->type), i->width > 1 ? 2 : 1,
-                                   (hsize_t[]){(hsize_t)i->n, (hsize_t)i->width}, 0);
-}
-
-void bt_snapshot_file_put(bt_snapshot *s, const bt_item *i, int64_t n, const void *rows)
-{
-    struct bt_snapshot_file *f = s->file;
-    char name[160];
-    snprintf(name, sizeof name, "/%s", i->name);
-    if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&f->h, name, rows);
-    else bt_h5_write_rows(&f->h, f->dataset, memory_type(i->type), false, 0, (hsize_t)s->rows, (hsize_t)n, rows);
+    enter(&s->file->h, s, s->n - 1);
 }
 
 void bt_snapshot_end(bt_snapshot *s, bt_errors *err)
@@ -117,6 +114,7 @@ static void release(bt_snapshot *s, bool keep)
     free(s->file->path);
     free(s->file);
     s->file = NULL;
+    s->sink = NULL;
 }
 
 bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err)
@@ -127,15 +125,23 @@ bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err)
     return status;
 }
 
-void bt_snapshot_drop(bt_snapshot *s)
+static void drop(bt_snapshot *s)
 {
-    if (!s->file) return;
     bt_errors unheard = {0};
     if (s->file->dataset >= 0) H5Dclose(s->file->dataset);
     s->file->h.err = &unheard;
     if (!s->file->ended) bt_h5_close(&s->file->h);
     bt_errors_free(&unheard);
     release(s, false);
+}
+
+void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
+{
+    static const bt_snapshot_sink sink = {.begin = begin_array, .put = put_rows, .drop = drop};
+    s->sink = &sink;
+    struct bt_snapshot_file *f = s->file = bt_alloc(1, sizeof *f);
+    *f = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
+    if (bt_h5_create_with_room(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
 }
 
 enum { MOST_COLUMNS = 1000 };

@@ -15,8 +15,8 @@
 
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
                     BASE_BYTES = 20e6;
-// on rank 0 while it writes one: rows on the way, columns, the field, contacts
-static const double CHECKPOINT_BYTES_PER_FLOE = 1000;
+// on rank 0 while it writes one: contacts on the way, and a column of the bodies
+static const double CHECKPOINT_BYTES_PER_FLOE = 300;
 
 // --- disk ------------------------------------------------------------------------------------------------------------
 

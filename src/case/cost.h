@@ -23,7 +23,7 @@ double bt_cost_floe_step(double concentration);
 double bt_cost_seconds(const bt_case *c);
 
 /// Memory of a node with ranks_here of `size` ranks, B: 2 kB a floe (body arrays about 0.5 kB, contacts and lists about
-/// 1.5 kB in dense ice) shared by the ranks, 0.2 kB a floe on each for the field at time zero, 1 kB a floe on one of
+/// 1.5 kB in dense ice) shared by the ranks, 0.2 kB a floe on each for the field at time zero, 0.3 kB a floe on one of
 /// them for the time of a checkpoint, and what the summary keeps of every step.
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here);
 

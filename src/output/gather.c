@@ -143,9 +143,10 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);
     for (bt_idx i = 0; i < l.n; i++) {
         const bt_idx k = l.body[i];
-        rows[alone ? l.gid[i] : i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
-                                 .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y,
-                                 .fx = net[k][0], .fy = net[k][1]};
+        rows[alone ? l.gid[i] : i] = (bt_frame_row){
+            .x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
+            .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y, .fx = net[k][0],
+            .fy = net[k][1]};
     }
     free(force);
     free(net);

@@ -203,7 +203,7 @@ static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, ch
 }
 
 /// Rows that a column is taken from at a time.
-enum { PORTION = 1024 };
+enum { PORTION = 4096 };
 
 static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows,
                          size_t size, int64_t n)
@@ -213,6 +213,7 @@ static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *
         snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
         bt_snapshot_begin(s, name, columns[k].type, n, columns[k].width);
         char *portion = bt_alloc(PORTION * (size_t)columns[k].width, bt_item_size(columns[k].type));
+        if (n == 0) bt_snapshot_put(s, 0, portion);
         for (int64_t i = 0; i < n; i += PORTION) {
             const int64_t now = n - i < PORTION ? n - i : PORTION;
             column(&columns[k], (char *)rows + (size_t)i * size, size, now, portion, true);
@@ -547,19 +548,21 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
                                bt_errors *err)
 {
+    enum { FLOES = 1024 }; // at a time
     const bt_bodies *b = &w->bodies;
     double most = 0;
     for (bt_idx i = 0; i < b->n; i++)
         if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
     bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
     const size_t width = 2 * (size_t)most, size = width * sizeof(double);
-    double *mine = bt_alloc(PORTION, size), *all = bt_alloc(PORTION, size), *packed = bt_alloc(PORTION, size);
-    bt_gid *gid = bt_alloc(PORTION, sizeof *gid);
+    double *mine = bt_alloc(FLOES, size), *all = bt_alloc(FLOES, size), *packed = bt_alloc(FLOES, size);
+    bt_gid *gid = bt_alloc(FLOES, sizeof *gid);
     int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
     bt_status status = BT_OK;
     if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
-    for (bt_gid from = 0; from < n && status == BT_OK; from += PORTION) {
-        const bt_gid end = n - from < PORTION ? n : from + PORTION;
+    if (c->rank == 0 && n == 0) bt_snapshot_put(s, 0, packed);
+    for (bt_gid from = 0; from < n && status == BT_OK; from += FLOES) {
+        const bt_gid end = n - from < FLOES ? n : from + FLOES;
         bt_idx own = 0;
         for (bt_gid g = from; g < end; g++) {
             const bt_idx i = bt_world_index(w, g);
