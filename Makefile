@@ -81,9 +81,9 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev deps-docs \
-        docs demo report bench fullscale partition-study validation test test-long mutate lint tidy validate asan tsan \
-        valgrind coverage fuzz
+.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-long deps-lint deps-dev \
+        deps-docs docs demo report bench fullscale partition-study validation test test-long mutate lint tidy \
+        validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -217,6 +217,10 @@ DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest pyt
              python3-netcdf4 python3-pip python3-venv python3-setuptools python3-wheel python3-gdal gdal-bin \
              python3-pyproj python3-shapely python3-distributed zsh $(DEPS_DOCS)
 
+# For make test-long, beyond that: programs that read results (ParaView, Octave), Snakemake, and what makes Debian
+# packages, their root, and a container.
+DEPS_LONG := dpkg-dev debhelper fakeroot lintian snakemake python3-paraview octave mmdebstrap buildah
+
 # SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
 SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'
 deps: ## install the Debian packages that are missing, for all but the tests
@@ -284,7 +288,10 @@ test: deps-test ## every test: units, known answers, same bits, command line, sh
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
-test-long: deps-test ## tests that take minutes: intervals over fields, long tows, finer steps, kills, faults, soak
+deps-long: ## install what make test-long needs
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_TEST) $(DEPS_LONG)'
+
+test-long: deps-long ## tests that take minutes: intervals over fields, long tows, finer steps, kills, faults, soak
 	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=asan all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long

@@ -82,6 +82,15 @@ def options_of(command):
     return out
 
 
+#: variables of the environment that the scripts are started by
+OF_SCRIPTS = (("BERGTOW_HOME", "folder that holds postproc/, where the scripts of commands are"),
+              ("PYTHON", "Python that starts these scripts; default /usr/bin/python3"))
+
+
+def terms(pairs):
+    return [line for name, text in pairs for line in (".TP", f"\\fB{name}\\fR", text)]
+
+
 def man_page(found, own, codes, version):
     out = [f'.TH BERGTOW 1 "" "bergtow {version}" "User Commands"', ".SH NAME",
            "bergtow \\- simulate a body that is towed through broken sea ice", ".SH SYNOPSIS"]
@@ -94,11 +103,8 @@ def man_page(found, own, codes, version):
     for c in found:
         out += [f".SS bergtow {c.name} [\\fIOPTION\\fR...] \\fI{roff(c.operands)}\\fR", roff(c.about)]
         out += options_of(c)
-    out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT"]
-    for name, text in (("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
-                       ("BERGTOW_HOME", "folder that holds postproc/, where the scripts of commands are"),
-                       ("PYTHON", "Python that starts these scripts; default /usr/bin/python3")):
-        out += [".TP", f"\\fB{name}\\fR", text]
+    out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT",
+            *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"), *OF_SCRIPTS])]
     return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"
 
 
@@ -107,7 +113,8 @@ def man_page_of_report(report, version):
         '.\\" made by install/from_help.py', f'.TH BERGTOW\\-REPORT 1 "" "bergtow {version}" "User Commands"',
         ".SH NAME", "bergtow\\-report \\- write the report of a run or of an ensemble", ".SH SYNOPSIS",
         f".B bergtow\\-report\n[\\fIOPTION\\fR...] \\fI{roff(report.operands)}\\fR", ".SH DESCRIPTION",
-        roff(report.about), ".SH OPTIONS", *options_of(report), ".SH SEE ALSO", ".BR bergtow (1)", ""])
+        roff(report.about), ".SH OPTIONS", *options_of(report), ".SH ENVIRONMENT", *terms(OF_SCRIPTS),
+        ".SH SEE ALSO", ".BR bergtow (1)", ""])
 
 
 def with_values(found):

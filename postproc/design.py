@@ -278,10 +278,7 @@ def main(argv=None):
     if not a.no_pdf:
         pdf.browser()
     made = ["report.html"] + ["report.pdf"] * (not a.no_pdf)
-    for folder in a.also:
-        if not any((folder / f"{name}.json").is_file() for name in findings.KINDS):
-            raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in findings.KINDS)}",
-                           "name the folder of bergtow converge, budget or capability with --also")
+    findings.also(a.also)
     for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         command.may_write(a.output / name, a.force)
     a.output.mkdir(parents=True, exist_ok=True)

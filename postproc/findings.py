@@ -13,6 +13,7 @@ import budget_text
 import capability_text
 import command
 import converge_text
+from bergtow_read import RunError
 from case_runs import above_zero
 
 #: heading and words, in the order of a report
@@ -62,6 +63,14 @@ def keep(name, found, folder, force):
 
 
 # ---- reports
+
+
+def also(folders):
+    """Folders named by --also hold what they are named for. Errors: RunError."""
+    for folder in folders:
+        if not any((folder / f"{name}.json").is_file() for name in KINDS):
+            raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
+                           "name the folder of bergtow converge, budget or capability with --also")
 
 
 def read(name, folder):

@@ -11,10 +11,11 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import command
+import findings
 import pdf
 import report_run
 import vector
-from bergtow_read import Run
+from bergtow_read import Run, RunError
 from report_case import TITLE_BLOCK
 from replay import LIMIT
 
@@ -117,8 +118,11 @@ def pages(folder, paths, a):
     # the second alone: it has only just begun
     if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         import report_ensemble  # and with it the statistics, which a run has no need of
+        findings.also(a.also)
         template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, a.also)
     else:
+        if a.also:
+            raise RunError(folder, "is a run, and --also is of an ensemble", "leave --also out")
         with Run(folder) as run:
             template, context = "run.html", report_run.context(run, 1e6 * a.size, not a.no_compression, given)
     return {path: render(template, context, path.suffix.lower() == ".pdf") for path in paths}

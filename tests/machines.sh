@@ -1,8 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, by hashes;
-# and from another C library (musl, static): steps of a world without files, as Debian's other libraries are for glibc.
-# What writes files is compiled with musl's headers, all but src/app, whose argp musl leaves to a library of its own.
+# The same bits from another compiler (clang) and on another architecture (ARM, under qemu, where the unit tests run
+# too): runs of cases, by hashes; and from another C library (musl, static): steps of a world without files, as
+# Debian's other libraries are for glibc. What writes files is compiled with musl's headers, all but src/app, whose
+# argp musl leaves to a library of its own.
 #
 #     tests/machines.sh [FOLDER]      FOLDER takes 600 MB: Debian's libraries for arm64, and what is built with them
 #
@@ -45,7 +46,7 @@ done
 echo "sources that musl does not compile: $foreign"
 make -s CC=clang-14 BUILD="$folder/clang" all >"$folder/clang.log"
 
-if [ ! -e "$lib/libmetis.so" ]; then
+if [ ! -e "$lib/libmetis.so" ] || [ ! -e "$lib/libcmocka.so" ]; then
   mkdir -p "$folder"/apt/{lists,cache/archives,state} "$root"
   : >"$folder/apt/state/status"
   # shellcheck disable=SC1091
@@ -59,29 +60,44 @@ Dir::Cache "$folder/apt/cache"; Dir::Etc::sourcelist "$folder/sources.list"; Dir
 END
   apt-get -qq -c "$folder/apt.conf" update
   apt-get -qq -c "$folder/apt.conf" install -y --download-only libhdf5-openmpi-dev libopenmpi-dev libmetis-dev \
-    libyaml-dev libjansson-dev libxxhash-dev librandom123-dev libgomp1 libc6-dev >"$folder/apt.log"
+    libyaml-dev libjansson-dev libxxhash-dev librandom123-dev libgomp1 libc6-dev libcmocka-dev >"$folder/apt.log"
   for package in "$folder"/apt/cache/archives/*.deb; do dpkg -x "$package" "$root"; done
+  # links to the root of a machine lead out of this one; without libm.so its static half would be taken
+  find "$lib" -maxdepth 1 -lname '/*' | while read -r link; do ln -sf "$root$(readlink "$link")" "$link"; done
 fi
 make -s CC="aarch64-linux-gnu-gcc --sysroot=$root" BUILD="$folder/arm" \
   MPI_CFLAGS="-I$lib/openmpi/include" HDF5_CFLAGS="-I$root/usr/include/hdf5/openmpi" \
-  MPI_LIBS="-L$lib/openmpi/lib -lmpi" HDF5_LIBS="-L$lib/hdf5/openmpi -lhdf5" all >"$folder/arm.log"
+  MPI_LIBS="-L$lib/openmpi/lib -lmpi" HDF5_LIBS="-L$lib/hdf5/openmpi -lhdf5" all tests >"$folder/arm.log"
 
 search=/usr/lib/aarch64-linux-gnu
-arm() {
-  BERGTOW_STARTED=1 qemu-aarch64-static -E LD_LIBRARY_PATH=$search:$search/openmpi/lib:$search/hdf5/openmpi -L "$root" \
-    "$folder/arm/bergtow" "$@"
+emulated="qemu-aarch64-static -E LD_LIBRARY_PATH=$search:$search/openmpi/lib:$search/hdf5/openmpi -L $root"
+arm() { # PROGRAM ARGUMENT...
+  # shellcheck disable=SC2086 # one word an option
+  BERGTOW_STARTED=1 $emulated "$folder/arm/$1" "${@:2}"
 }
+# Open MPI of this machine starts ranks of the other: ranks -n R PROGRAM WORD
+cat >"$folder/ranks" <<END
+#!/bin/sh
+exec mpirun --oversubscribe -n "\$2" $emulated "\$3" "\$4"
+END
+chmod +x "$folder/ranks"
+export MPIRUN=$folder/ranks GOMP_SPINCOUNT=5000 # as tests/run.sh has it
 state() { sed -n 's/.*"state_hash": "\(.*\)".*/\1/p' "$folder/$1/summary.json"; }
 
 passed=0 failed=0
 if [ "${#here}" = 16 ] && [ "$here" = "$there" ]; then passed=1; else failed=1; fi
 if [ $foreign = 0 ]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+for test in tests/{unit,physics,fuzz}/test_*.c; do
+  test=$folder/arm/${test%.c}
+  if arm "tests/${test#*/arm/tests/}" >"$test.log" 2>&1; then passed=$((passed + 1)); else
+    failed=$((failed + 1)) && echo "ARM, ${test##*/}: failed, see $test.log"; fi
+done
 compare() { # NAME CASE OPTION...
   local name=$1
   shift
   build/release/bergtow run "$@" -o "$folder/here" --force --quiet
   "$folder/clang/bergtow" run "$@" -o "$folder/there" --force --quiet
-  arm run "$@" -o "$folder/far" --force --quiet
+  arm bergtow run "$@" -o "$folder/far" --force --quiet
   echo "$name: gcc $(state here), clang $(state there), ARM $(state far)"
   if [ "$(state here)" = "$(state there)" ] && [ "$(state here)" = "$(state far)" ]; then passed=$((passed + 1)); else
     failed=$((failed + 1)); fi
@@ -92,7 +108,7 @@ compare "outlines of a map" cases/outlines/outlines.yml --steps 100
 compare "line in the basin" cases/basin/basin-50.yml --steps 200
 # and a checkpoint from here goes on over there
 build/release/bergtow run cases/basin/basin-50.yml --steps 100 -o "$folder/far" --force --quiet
-arm resume "$folder/far" --steps 100 --quiet
+arm bergtow resume "$folder/far" --steps 100 --quiet
 build/release/bergtow run cases/basin/basin-50.yml --steps 200 -o "$folder/here" --force --quiet
 if [ "$(state here)" = "$(state far)" ]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
 echo "$passed passed, $failed failed"

@@ -1,6 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# From a bare Debian, as a new user has it: make demo, then make test, each of which installs what it lacks.
+# From a bare Debian, as a new user has it: make demo, then make test, each of which installs what it lacks; then the
+# other compiler and the other MPI (tests/builds.sh).
 #
 #     tests/roots.sh [FOLDER [RELEASE...]]      as root, in roots of their own in FOLDER (4 GB each): bookworm, trixie
 #
@@ -40,6 +41,7 @@ no_more_than_most() { # MEGABYTES
   [ "$1" -le $most ]
 }
 
+others="clang libomp-dev libhdf5-openmpi-dev libhdf5-mpich-dev openmpi-bin mpich"
 for release in "$@"; do
   root=$folder/$release
   rm -rf "$root" "$root.tar"
@@ -56,6 +58,10 @@ for release in "$@"; do
   step "$release, make test" "$root.tests.log" within "$root" make -C /src test
   grep -aE "^[0-9]+ passed, .* skipped" "$root.tests.log" || true
   echo "$release: with it $(($(megabytes "$root") - before)) MB"
+  # shellcheck disable=SC2086 # one word a package
+  step "$release, other MPI and compiler" "$root.apt2.log" within "$root" env DEBIAN_FRONTEND=noninteractive apt-get \
+    install -y --no-install-recommends $others
+  step "$release, builds" "$root.builds.log" within "$root" /src/tests/builds.sh
 done
 echo "$passed passed, $failed failed"
 [ $failed = 0 ]

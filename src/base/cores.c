@@ -12,8 +12,9 @@
 
 bool bt_cores_given(cpu_set_t *cores)
 {
-    // With OMP_PROC_BIND libgomp has bound this thread to one of the places by now.
-    const int n_places = omp_get_num_places();
+    // With OMP_PROC_BIND the runtime has bound this thread to one of the places by now. Without it libgomp knows no
+    // places, while clang's libomp has one: the cores as they were when it started.
+    const int n_places = omp_get_proc_bind() == omp_proc_bind_false ? 0 : omp_get_num_places();
     if (n_places == 0) return sched_getaffinity(0, sizeof *cores, cores) == 0;
     CPU_ZERO(cores);
     for (int p = 0; p < n_places; p++) {

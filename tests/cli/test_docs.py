@@ -66,6 +66,7 @@ def script_calls(path, within_lines=True):
     one also the options that stand alone in it, one a call."""
     text = path.read_text()
     for line in commands(text) + (spans(text) if within_lines else []):
+        line = re.sub(r"^\s*bergtow-report\b", "postproc/report.py", line)  # which is what it calls
         m = re.match(r"(?:/usr/bin/python3 )?([\w/]+\.py)(?: (.*))?$", line.strip())
         if m and (file := script(m[1], path.parent)):
             yield line, file, shlex.split(re.sub(r"[|>&].*", "", m[2] or ""))

@@ -170,3 +170,23 @@ def test_make_install_has_the_command(towed, tmp_path):
     said = subprocess.run([tmp_path / "bin/bergtow-report", "--help"], capture_output=True, text=True,
                           env=environment())
     assert said.stdout.startswith("usage: bergtow-report ")
+
+
+def test_the_source_tree_has_the_command(towed, tmp_path):
+    """Not the package: nothing has been put anywhere, and what is missing is told by a line."""
+    command = ROOT / "install/bergtow-report"
+    env = environment()
+    for name in ("PYTHONPATH", "BERGTOW_HOME", "PYTHON"):
+        env.pop(name, None)
+    said = subprocess.run([command, towed, "-o", tmp_path / "x.html"], capture_output=True, text=True, env=env)
+    assert said.returncode == 0 and (tmp_path / "x.html").stat().st_size > 1e5, said.stderr
+    for extra, words in ({"BERGTOW_HOME": "/nowhere"}, "BERGTOW_HOME"), ({"PYTHON": "/nowhere"}, "PYTHON"):
+        said = subprocess.run([command, towed], capture_output=True, text=True, env=env | extra)
+        assert said.returncode == 4 and said.stderr.startswith("bergtow-report: /nowhere") and words in said.stderr
+
+
+def test_findings_are_taken_from_folders_that_have_some(towed, speeds, tmp_path):
+    for folder in towed, speeds:
+        said = subprocess.run([ROOT / "install/bergtow-report", folder, "-o", tmp_path / "x.html", "--also", tmp_path],
+                              capture_output=True, text=True, env=environment())
+        assert said.returncode == 4 and "--also" in said.stderr and not (tmp_path / "x.html").exists()

@@ -20,7 +20,7 @@ def called(*words, cwd=None, **env):
 @pytest.fixture(scope="module")
 def packed():
     if not shutil.which("dh"):
-        pytest.skip("debhelper is missing: apt-get install dpkg-dev debhelper fakeroot")
+        pytest.skip("debhelper is missing: make deps-long")
     called("make", "deb", cwd=ROOT)
 
 
@@ -34,7 +34,7 @@ def usr(packed, tmp_path_factory):
     return root / "usr"
 
 
-@pytest.mark.skipif(not shutil.which("lintian"), reason="lintian is missing: apt-get install lintian")
+@pytest.mark.skipif(not shutil.which("lintian"), reason="lintian is missing: make deps-long")
 def test_lintian_has_no_error_and_no_warning(packed):
     called("lintian", "--allow-root", "--fail-on", "error,warning", *(ROOT / "build/deb").glob("*.changes"))
 

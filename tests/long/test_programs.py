@@ -23,7 +23,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def seen(made):
-    assert shutil.which("pvpython"), "ParaView is missing: apt-get install --no-install-recommends python3-paraview"
+    assert shutil.which("pvpython"), "ParaView is missing: make deps-long"
     done = subprocess.run(["pvpython", SCRIPT, made.dir / "frames.xdmf", made.dir / "seen.npz"], capture_output=True,
                           text=True, timeout=300)
     # Red: an array of another size or type than frames.xdmf says, which ParaView complains of and goes on.
@@ -77,7 +77,7 @@ def test_paraview_has_the_frames(made, seen, reader, names):
 
 def test_octave_loads_groups(made):
     """By name: at texts in UTF-8, such as /case, its reader gives up."""
-    assert shutil.which("octave-cli"), "Octave is missing: apt-get install --no-install-recommends octave"
+    assert shutil.which("octave-cli"), "Octave is missing: make deps-long"
     groups = ("series", "frames", "floes", "impacts", "panels")
     lines = [f"s = load('-hdf5', 'result.h5', {', '.join(map(repr, groups))});"]
     with h5py.File(made.dir / "result.h5") as f:

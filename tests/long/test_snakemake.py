@@ -16,7 +16,7 @@ SNAKEFILE = ROOT / "cases/studies/Snakefile"
 
 @pytest.fixture(scope="module", autouse=True)
 def snakemake():
-    assert shutil.which("snakemake"), "snakemake is missing: apt-get install --no-install-recommends snakemake"
+    assert shutil.which("snakemake"), "snakemake is missing: make deps-long"
 
 
 def study(folder, duration):

@@ -190,7 +190,9 @@ static void detect_equals_brute_force_with_parts(void **state)
         double v[2 * BT_MAX_VERTICES];
         for (int i = 0; i < 120; i++) {
             const int n = i % 3 ? random_star(&rng, 0.8, v) : scene_random_polygon(&rng, 0.6, v);
-            add_outline(w, n, v, box * scene_uniform(&rng), box * scene_uniform(&rng), 7 * scene_uniform(&rng), 0, 0);
+            // one after the other: compilers differ in the order of arguments
+            const double yaw = 7 * scene_uniform(&rng), y = box * scene_uniform(&rng), x = box * scene_uniform(&rng);
+            add_outline(w, n, v, x, y, yaw, 0, 0);
         }
         // A large one, with bays: in the last cell, with floes of any other.
         int n_large;

@@ -70,7 +70,10 @@ static void check_step(const bt_world *w)
     assert_true(st->converged);
     assert_true(st->momentum_residual < 1e-9);
     assert_true(st->contact_work <= 1e-6 * (1 + fabs(st->contact_work)));
-    assert_true(scene_law(w, "raft_edge_work") >= 0 && scene_law(w, "raft_friction_work") >= -1e-9);
+    // Work is by the mean of the speeds without contacts and with them: an edge that would part, and that another
+    // contact presses to its bound, gives a little.
+    assert_true(scene_law(w, "raft_edge_work") >= -1e-3 * fabs(st->contact_work));
+    assert_true(scene_law(w, "raft_friction_work") >= -1e-9);
 }
 
 /// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more
@@ -289,9 +292,11 @@ static void energy_is_booked(void **state)
         for (int i = 0; i < 9; i++) {
             double v[2 * BT_MAX_VERTICES];
             const int n = scene_random_polygon(&rng, 5, v);
-            add(w, BT_DYNAMIC, n, v, 15 * (i % 3), 15 * (i / 3), 6 * scene_uniform(&rng), 0.3 + scene_uniform(&rng));
-            *vel(w, i) = (bt_vel){-0.08 * (15 * (i % 3) - 15), -0.08 * (15 * (i / 3) - 15) + 0.3 * scene_uniform(&rng),
-                                  0.1 * scene_uniform(&rng), 0};
+            // one after the other: compilers differ in the order of arguments
+            const double thickness = 0.3 + scene_uniform(&rng), yaw = 6 * scene_uniform(&rng);
+            const double vy = 0.3 * scene_uniform(&rng), spin = 0.1 * scene_uniform(&rng);
+            add(w, BT_DYNAMIC, n, v, 15 * (i % 3), 15 * (i / 3), yaw, thickness);
+            *vel(w, i) = (bt_vel){-0.08 * (15 * (i % 3) - 15), -0.08 * (15 * (i / 3) - 15) + vy, spin, 0};
         }
         double before = 0, edge = 0, friction = 0, all = 0;
         for (int s = 0; s < 400; s++) {

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Recipe for Spack, of a checkout:
+"""Recipe for Spack 1.0 or later, of a checkout:
 
-    spack repo add install/spack
+    spack repo add install/spack/spack_repo/bergtow
     spack dev-build --source-path "$PWD" bergtow@main
 """
-from spack.package import (Executable, MakefilePackage, depends_on, license, on_package_attributes, run_after,
-                           version)
+from spack_repo.builtin.build_systems.makefile import MakefilePackage
+
+from spack.package import Executable, depends_on, license, version
 
 
 class Bergtow(MakefilePackage):
@@ -21,12 +22,12 @@ class Bergtow(MakefilePackage):
     depends_on("pkgconfig", type="build")
     depends_on("python@3.10:", type=("build", "run"))
     depends_on("mpi@3:")
-    depends_on("hdf5@1.10:")
+    depends_on("hdf5@1.10: +hl")
     depends_on("metis@5:")
     depends_on("libyaml")
     depends_on("jansson")
     depends_on("random123")
-    depends_on("xxhash")
+    depends_on("xxhash@0.8:")
     for package in ("numpy", "h5py", "matplotlib", "jinja2", "pyyaml", "scipy"):
         depends_on(f"py-{package}", type="run")
 
@@ -37,19 +38,27 @@ class Bergtow(MakefilePackage):
             f"CC={self.module.spack_cc}",
             f"MPICC={self.spec['mpi'].mpicc}",
             f"HDF5_CFLAGS={self.spec['hdf5'].headers.include_flags}",
-            f"HDF5_LIBS={self.spec['hdf5:c'].libs.ld_flags}",
+            f"HDF5_LIBS={self.spec['hdf5:hl'].libs.ld_flags}",
             # the wrapper adds -march where the Makefile does not see it: no fused operations, the same bits
             "EXTRA_CFLAGS=-fno-tree-vectorize",
             f"PYTHON={self.spec['python'].command.path}",
         ]
 
-    def build(self, spec, prefix):
-        self.module.make("all", *self.made_with)
+    @property
+    def build_targets(self):
+        return ["all", "lib", *self.made_with]
 
-    def install(self, spec, prefix):
-        self.module.make("install", f"PREFIX={prefix}", *self.made_with)
+    @property
+    def install_targets(self):
+        return ["install", f"PREFIX={self.prefix}", *self.made_with]
 
-    @run_after("install")
-    @on_package_attributes(run_tests=True)
-    def check_install(self):
-        Executable(self.prefix.bin.bergtow)("--version")
+    def check(self):
+        """Not `make test`, which would install Debian's packages."""
+
+    def installcheck(self):
+        Executable(self.prefix.bin.bergtow)("run", "cases/basin/basin-20.yml", "--steps", "10", "-o", "out/check",
+                                            "--force")
+
+    def setup_run_environment(self, env):
+        env.set("PYTHON", self.spec["python"].command.path)
+        env.prepend_path("PYTHONPATH", self.prefix.share.bergtow.postproc)
