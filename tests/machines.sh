@@ -81,7 +81,7 @@ cat >"$folder/ranks" <<END
 exec mpirun --oversubscribe -n "\$2" $emulated "\$3" "\$4"
 END
 chmod +x "$folder/ranks"
-export MPIRUN=$folder/ranks GOMP_SPINCOUNT=5000 # as tests/run.sh has it
+export MPIRUN=$folder/ranks EMULATOR=$emulated GOMP_SPINCOUNT=5000 # as tests/run.sh has it
 state() { sed -n 's/.*"state_hash": "\(.*\)".*/\1/p' "$folder/$1/summary.json"; }
 
 passed=0 failed=0

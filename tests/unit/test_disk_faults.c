@@ -97,7 +97,7 @@ static int every(int kind, int first, const char *path, bt_status (*work)(const 
             return n;
         }
         if (status != BT_ERR_IO || err.n != 1 || !strstr(err.text[0], strerror(reason_of[kind])))
-            fail_msg("call %d of kind %d: status %d, %d errors: %s", n, kind, status, err.n, err.n ? err.text[0] : "");
+            fail_msg("call %d of kind %d: status %d, %zu errors: %s", n, kind, status, err.n, err.n ? err.text[0] : "");
         bt_errors_free(&err);
     }
 }
