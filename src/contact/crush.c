@@ -146,12 +146,12 @@ static patch patch_of(const bt_world *w, const uint16_t part[2], const bt_manifo
     return o.n > 0 ? (patch){high - low, 0.5 * (low + high)} : (patch){0, NAN};
 }
 
-/// Length of a patch that falls to point i of the manifold: uniform pressure on it, as forces at the points. NaN: to
-/// each alike.
-static double share_of(const bt_manifold *m, int i, patch c, const bool near[2])
+/// Length of a patch that falls to point i of the manifold, of those that may close: uniform pressure on it, as forces
+/// at the points. NaN: to each alike.
+static double share_of(const bt_manifold *m, int i, patch c, const bool closes[2])
 {
-    if (m->n_points == 1 || !near[1 - i]) return 1;
-    if (!near[i]) return 0;
+    if (m->n_points == 1 || !closes[1 - i]) return 1;
+    if (!closes[i]) return 0;
     const double t0 = m->nx * m->p[0].ra[1] - m->ny * m->p[0].ra[0], t1 = m->nx * m->p[1].ra[1] - m->ny * m->p[1].ra[0];
     if (!(t1 != t0) || isnan(c.middle)) return 0.5;
     const double second = bt_max(0, bt_min(1, (c.middle - t0) / (t1 - t0)));
@@ -169,30 +169,15 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     // then its edges bear no more than this, and give way as they do when they raft
     const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
-    // Points that may close in this step. Others are there or not as the margin of the search has it, which must not
-    // decide what the contact bears.
-    double gap = INFINITY, approach = 0;
-    bool near[2] = {false, false};
-    int n_near = 0;
+    for (int i = 0; i < m->n_points; i++) g->gap[i] += l->depth[i];
+    const bt_closing c = bt_law_closing(w, t, j);
+    const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / c.n;
+    const double way = bt_max(dt * c.approach - c.gap, LEAST_WAY * w->par.size);
+    const patch now = patch_of(w, p->part, m, c.gap + w->par.slop),
+                then = patch_of(w, p->part, m, c.gap + w->par.slop + way);
     for (int i = 0; i < m->n_points; i++) {
-        g->gap[i] += l->depth[i];
-        gap = bt_min(gap, bt_max(g->gap[i], 0));
-    }
-    for (int i = 0; i < m->n_points; i++) {
-        const double before = bt_normal_velocity(u, i, &s->vel_start[m->a], &s->vel_start[m->b]);
-        const double closing =
-            bt_max(0, -bt_min(before, bt_normal_velocity(u, i, &s->vel_free[m->a], &s->vel_free[m->b])));
-        near[i] = g->gap[i] <= dt * closing + w->par.slop || g->gap[i] <= gap;
-        n_near += near[i];
-        if (near[i]) approach = bt_max(approach, closing);
-    }
-    const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / n_near;
-    const double way = bt_max(dt * approach - gap, LEAST_WAY * w->par.size);
-    const patch now = patch_of(w, p->part, m, gap + w->par.slop),
-                then = patch_of(w, p->part, m, gap + w->par.slop + way);
-    for (int i = 0; i < m->n_points; i++) {
-        const double length = now.length * share_of(m, i, now, near),
-                     later = bt_max(length, then.length * share_of(m, i, then, near));
+        const double length = now.length * share_of(m, i, now, c.point),
+                     later = bt_max(length, then.length * share_of(m, i, then, c.point));
         l->flat[i] = bt_min(l->flat[i], per_length * bt_max(length, least));
         l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
         if (later <= bt_max(length, least)) continue; // as long as it gets

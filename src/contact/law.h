@@ -161,6 +161,18 @@ bt_idx bt_law_find(const bt_cell *t, const bt_memory *names);
 /// Write record r: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
 void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r);
 
+/// Points of a contact that may close in this step.
+typedef struct bt_closing {
+    bool point[2];
+    int n;           ///< how many: one at least
+    double gap;      ///< the least of all points, at least 0, m
+    double approach; ///< the fastest of those that may close, at least 0, m/s
+} bt_closing;
+
+/// Those of contact j of cell t, by its gaps as they are now. A point that may not close is there or not as the margin
+/// of the search has it, and with it the speeds of bodies nearby: what a contact bears must depend on the others alone.
+bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j);
+
 /// Names of the record that a law has, or would have, of pair p.
 static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int law)
 {

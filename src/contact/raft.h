@@ -28,7 +28,7 @@
 //
 // First touch. A pair that has not rafted has the contact points of its outlines, and the same bound with the length
 // that bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h
-// (assumed), or a corner would bear nothing.
+// (assumed), or a corner would bear nothing; two points that may both close in the step share it.
 //
 // Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they
 // overlap, friction of at most

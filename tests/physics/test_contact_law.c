@@ -14,6 +14,14 @@
 
 #include "examples/contact_law.c"
 
+static bt_law_contact seen; // by the bound of the fender, the last time
+
+static void watch(const bt_law_contact *t, double load[2], double given[2])
+{
+    seen = *t;
+    fender_bound(t, load, given);
+}
+
 static const double sheet = 50, soft = 30, stiff = 400; // kg/m², N, N/m
 
 /// The hull: a slab from x = 0.71 on that stands still, and is what is towed.
@@ -71,6 +79,29 @@ static void it_creeps_until_it_bears(void **state)
         }
         const double depth = bt_max(0, (0.5 * force[i] - soft) / stiff);
         CHECK_CLOSE(pressed(w), depth, 0.005 * depth + 1e-9);
+        bt_world_free(w);
+    }
+}
+
+/// The length that a law is given is that between points which may close, whether the search finds others or not.
+static void its_length_is_what_may_close(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        const bool turned = i > 1, fast = i % 2;
+        const double yaw = turned ? 0.03 : 0;
+        bt_world *w = hull_and_floe(1e-4, yaw, 0.5, 0);
+        w->bodies.pose[0].x = 0.71 - 0.5 * (cos(yaw) + sin(yaw));
+        double v[8];
+        scene_square(1, v);
+        bt_body_def d = scene_prism(4, v, sheet);
+        d.x = -2, d.vx = -300;
+        if (fast) bt_world_add(w, &d);
+        bt_world_step(w);
+        assert_int_equal(seen.n, turned && !fast ? 1 : 2);
+        assert_int_equal(seen.closes[0] + seen.closes[1], turned ? 1 : 2);
+        for (int k = 0; k < seen.n; k++) assert_true(seen.closes[k] == (seen.gap[k] < 1e-3));
+        CHECK_CLOSE(seen.length, turned ? 0 : 1, 1e-9);
         bt_world_free(w);
     }
 }
@@ -179,9 +210,12 @@ static void numbers_of_the_laws_have_their_places(void **state)
 int main(void)
 {
     bt_errors err = {0};
-    if (bt_contact_register(&fender_law, &err) != BT_OK) bt_errors_print(&err);
+    bt_contact_law watched = fender_law;
+    watched.bound = watch;
+    if (bt_contact_register(&watched, &err) != BT_OK) bt_errors_print(&err);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(it_takes_the_energy_of_a_floe), cmocka_unit_test(it_creeps_until_it_bears),
+        cmocka_unit_test(its_length_is_what_may_close),
         cmocka_unit_test(it_is_the_hull_s_alone),        cmocka_unit_test(the_weaker_law_yields),
         cmocka_unit_test(a_state_of_other_laws_is_refused),
         cmocka_unit_test(what_will_not_do_is_refused),

@@ -139,6 +139,30 @@ static void two_squares(void **state)
     bt_world_free(w);
 }
 
+/// A corner meets an edge while the next one is far from it. A fast floe in the neighbourhood makes the search look
+/// farther ahead and find that corner, too, which must not change what the first one bears: the line load on a length
+/// of one thickness.
+static void the_margin_of_the_search(void **state)
+{
+    (void)state;
+    const double dt = 1e-4, yaw = 0.03, corner = 0.5 * (cos(yaw) + sin(yaw));
+    for (int fast = 0; fast < 2; fast++) {
+        bt_params p = params(dt);
+        p.slop = 1e-6, p.size = 1;
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(1, v);
+        const bt_gid floe = add(w, BT_DYNAMIC, 4, v, -corner, 0, yaw, h);
+        vel(w, floe)->x = 2;
+        add_box(w, BT_STATIC, 20, 20, 10, 0, h);
+        if (fast) vel(w, add(w, BT_DYNAMIC, 4, v, -corner - 2, 0, 0, h))->x = -300;
+        bt_world_step(w);
+        assert_true(w->stats.n_points == 1 + fast);
+        CHECK_CLOSE(vel(w, floe)->x, 2 - edge_load() * h * dt / ice, 1e-9);
+        bt_world_free(w);
+    }
+}
+
 /// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they
 /// meet as at first.
 static void out_behind(void **state)
@@ -320,6 +344,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_squares),
+        cmocka_unit_test(the_margin_of_the_search),
         cmocka_unit_test(out_behind),
         cmocka_unit_test(confined_row),
         cmocka_unit_test(apex_under_an_edge),
