@@ -65,12 +65,12 @@ static void put_rows(bt_snapshot *s, int64_t n, const void *rows)
     }
 }
 
-/// The array added last has all its rows.
-static void end_array(bt_snapshot *s)
+/// The last of the first n arrays has all its rows.
+static void end_array(bt_snapshot *s, int n)
 {
     struct bt_snapshot_file *f = s->file;
-    if (s->n == 0) return;
-    const bt_item *i = &s->item[s->n - 1];
+    if (n == 0) return;
+    const bt_item *i = &s->item[n - 1];
     if (f->dataset >= 0) bt_h5_check(&f->h, H5Dclose(f->dataset) >= 0); // small data go to the file only now
     f->dataset = -1;
     const char *units, *axes, *text = f->meaning ? f->meaning(i->name, &units, &axes) : NULL;
@@ -83,9 +83,7 @@ static void end_array(bt_snapshot *s)
 
 static void begin_array(bt_snapshot *s)
 {
-    s->n--;
-    end_array(s);
-    s->n++;
+    end_array(s, s->n - 1);
     enter(&s->file->h, s, s->n - 1);
 }
 
@@ -95,7 +93,7 @@ void bt_snapshot_end(bt_snapshot *s, bt_errors *err)
     if (f->ended) return;
     f->ended = true;
     f->h.err = err;
-    end_array(s);
+    end_array(s, s->n);
     // The axes last: a coordinate such as /history/time may follow what it belongs to.
     for (int k = 0; f->meaning && k < s->n; k++) {
         char name[160];
