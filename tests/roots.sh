@@ -1,9 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # From a bare Debian, as a new user has it: make demo, then make test, each of which installs what it lacks; then the
-# other compiler and the other MPI (tests/builds.sh).
+# other compiler and the other MPI (tests/builds.sh). In a second one nothing but what the tutorials say, word by word.
 #
-#     tests/roots.sh [FOLDER [RELEASE...]]      as root, in roots of their own in FOLDER (4 GB each): bookworm, trixie
+#     tests/roots.sh [FOLDER [RELEASE...]]      as root, in roots of their own in FOLDER (6 GB a release): bookworm, trixie
 #
 # A demo that takes more than 900 MB of the disk has failed, too. Needs mmdebstrap and the network. Takes the tree as it
 # is committed. Ends with `N passed, N failed`.
@@ -14,15 +14,7 @@ shift || true
 [ $# -gt 0 ] || set -- bookworm trixie
 command -v mmdebstrap >/dev/null || { echo "mmdebstrap is missing: apt-get install mmdebstrap"; exit 1; }
 
-# within ROOT COMMAND...: in a mount namespace that ends with the command
-within() {
-  # shellcheck disable=SC2016
-  unshare -m bash -c 'root=$1 && shift && mkdir -p "$root"/{proc,dev,sys} && mount --rbind /dev "$root/dev" &&
-    mount --rbind /sys "$root/sys" && mount -t proc proc "$root/proc" &&
-    cp /etc/resolv.conf /etc/hosts "$root/etc/" && exec chroot "$root" env -i \
-    PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 CI=true \
-    OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "$@"' - "$@"
-}
+within() { "$PWD/tests/within.sh" "$@"; }
 
 passed=0 failed=0
 step() { # NAME LOG COMMAND...
@@ -41,15 +33,21 @@ no_more_than_most() { # MEGABYTES
   [ "$1" -le $most ]
 }
 
+# bare ROOT: Debian with make and the sources, and nothing else
+bare() {
+  rm -rf "$1"
+  mkdir -p "$1/src"
+  tar -C "$1" --exclude='./dev/*' -xf "$folder/$release.tar"
+  git archive HEAD | tar -C "$1/src" -x
+  within "$1" sh -c 'apt-get update && apt-get install -y --no-install-recommends make' >"$1.apt.log" 2>&1
+}
+
 others="clang libomp-dev libhdf5-openmpi-dev libhdf5-mpich-dev openmpi-bin mpich"
 for release in "$@"; do
   root=$folder/$release
-  rm -rf "$root" "$root.tar"
+  rm -rf "$root.tar"
   mmdebstrap --quiet --variant=minbase "$release" "$root.tar" http://deb.debian.org/debian
-  mkdir -p "$root/src"
-  tar -C "$root" --exclude='./dev/*' -xf "$root.tar"
-  git archive HEAD | tar -C "$root/src" -x
-  within "$root" sh -c 'apt-get update && apt-get install -y --no-install-recommends make' >"$root.apt.log" 2>&1
+  bare "$root"
   before=$(megabytes "$root")
   step "$release, make demo" "$root.demo.log" within "$root" make -C /src demo
   taken=$(($(megabytes "$root") - before))
@@ -62,6 +60,9 @@ for release in "$@"; do
   step "$release, other MPI and compiler" "$root.apt2.log" within "$root" env DEBIAN_FRONTEND=noninteractive apt-get \
     install -y --no-install-recommends $others
   step "$release, builds" "$root.builds.log" within "$root" /src/tests/builds.sh
+  bare "$root-tutorials"
+  step "$release, tutorials" "$root.tutorials.log" tests/tutorial.py "$root-tutorials/src" \
+    "$PWD/tests/within.sh" "$root-tutorials" sh -c 'cd /src && exec "$@"' -
 done
 echo "$passed passed, $failed failed"
 [ $failed = 0 ]

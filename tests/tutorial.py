@@ -1,13 +1,18 @@
+#!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """A tutorial of docs/tutorials as a newcomer follows it: in a clean copy of the sources, by the page's words alone.
 
 Blocks are taken in their order. `sh` is run by a shell that ends at the first error; what comes under "Save ... as
 `NAME`:" is written to that file; `text` must have been printed by the command before, line by line; `console` is for a
 cluster, and is not run. Any other block is an error: there is nothing on a page that no one has tried.
+
+    tests/tutorial.py SOURCES [COMMAND...]      all of them, one after the other, in the folder SOURCES; each shell is
+                                                started by COMMAND, which may enter a machine of its own (roots.sh)
 """
 import re
 import shutil
 import subprocess
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,6 +58,7 @@ class Reader:
 
     folder: Path
     home: Path
+    machine: tuple = ()  # the command that starts a shell there
     printed: str = ""
     exported: dict = field(default_factory=dict)
 
@@ -78,9 +84,9 @@ class Reader:
         env = environment(HOME=self.home,
                           OMPI_MCA_rmaps_base_oversubscribe=1, MPLCONFIGDIR=self.home, PYTHONDONTWRITEBYTECODE=1)
         before = "".join(f"export {name}={value}\n" for name, value in self.exported.items())
-        done = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", before + text], cwd=self.folder,
+        done = subprocess.run([*self.machine, "bash", "-e", "-o", "pipefail", "-c", before + text], cwd=self.folder,
                               env={k: v for k, v in env.items() if k not in ("BERGTOW", "PYTHONPATH", "MAKEFLAGS")},
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=600)
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=1800)
         self.printed = done.stdout
         assert done.returncode == 0, f"{text}ended with {done.returncode}:\n{done.stdout}"
 
@@ -88,6 +94,10 @@ class Reader:
         lines = iter(self.printed.splitlines())
         for wanted in text.splitlines():
             assert any(wanted.strip() in line for line in lines), f"not printed: {wanted}\nbut:\n{self.printed}"
+
+
+def pages():
+    return sorted((ROOT / "docs/tutorials").glob("*.md"))
 
 
 def follow(name, folder):
@@ -99,3 +109,19 @@ def follow(name, folder):
     reader = Reader(sources, home)
     reader.follow(ROOT / "docs/tutorials" / name)
     return reader
+
+
+def main(sources, *machine):
+    failed = 0
+    for page in pages():
+        try:
+            Reader(Path(sources), Path("/root"), machine).follow(page)
+            print(f"{page.name}: followed", flush=True)
+        except AssertionError as e:
+            failed += 1
+            print(f"{page.name}: {e}", flush=True)
+    return failed > 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -5,9 +5,8 @@ import json
 import pytest
 
 import tutorial
-from harness import ROOT
 
-PAGES = sorted(p.name for p in (ROOT / "docs/tutorials").glob("*.md"))
+PAGES = [p.name for p in tutorial.pages()]
 
 
 def summary(reader, name):
