@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # gcc and clang, each with Open MPI and MPICH, gcc on the HDF5 without MPI, clang on that of its MPI: unit tests, the
-# demo's basin on one rank, and on two that one resumes; with the same hash of the state throughout.
+# demo's basin on one rank, and on two, resumed on more ranks than there are cores, and then alone; with the same hash of
+# the state throughout.
 #
 #     tests/builds.sh [FOLDER]      FOLDER takes 400 MB; tests/roots.sh calls it in Debian 12 and 13
 #
@@ -53,7 +54,9 @@ for cc in gcc clang; do
     same "$name" "$run"
     # shellcheck disable=SC2086 # one word an option
     count "$name, ranks" $MPIRUN -n 2 "$build/bergtow" run $case --steps 100 -o "$run" --force --quiet
-    count "$name, resume" "$build/bergtow" resume "$run" --steps 100 --quiet
+    # shellcheck disable=SC2086
+    count "$name, more ranks than cores" $MPIRUN -n $(($(nproc) + 3)) "$build/bergtow" resume "$run" --steps 10 --quiet
+    count "$name, resume" "$build/bergtow" resume "$run" --steps 90 --quiet
     same "$name, resumed" "$run"
   done
 done
