@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Identifiers, status codes and the list of messages that every fallible function appends to.
+//
+// Units, in all headers: SI, and radians. A coefficient, a ratio or a share (friction, restitution, C_w, tolerance, μ,
+// κ) is a plain number and has no unit beside it; whatever has a dimension does.
 #ifndef BERGTOW_BASE_H
 #define BERGTOW_BASE_H
 

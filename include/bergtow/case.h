@@ -168,7 +168,7 @@ typedef struct bt_case {
             double breaking_load;///< N, 0 = never breaks
         } line;
         struct {                 ///< the second branch; default: as the first, on the other side of the hull
-            double hull_x, hull_y, length, stiffness, damping, breaking_load;
+            double hull_x, hull_y, length, stiffness, damping, breaking_load; ///< m, m, m, N, N s/m, N
         } branch2;
         struct {                 ///< mode thrust, see tow.h
             double mass;         ///< kg

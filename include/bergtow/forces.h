@@ -118,7 +118,7 @@ typedef struct bt_force_body {
     // what few laws need is read from here by the functions below
     const bt_bodies *all;
     bt_idx i;
-    const double *towed_at;
+    const double *towed_at; ///< [2] m
 } bt_force_body;
 
 /// of the circle about the outline, m

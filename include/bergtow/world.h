@@ -73,7 +73,8 @@ typedef struct bt_body_def {
     const bt_parts *parts;  ///< of an outline that is not convex (bt_outline_split), or NULL
     double x, y, yaw;       ///< m, m, rad
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
-    double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
+    /// M = m(1+C_m), kg, I(1+C_I), kg m²; ignored unless dynamic, but kept for the inertia force
+    double mass, inertia;
     double added;           ///< m C_m, the part of the mass that Coriolis and the slope of the sea do not act on, kg
     double friction, restitution;
     double thickness;       ///< of ice, m; 0 = no ice: it is never crushed (crush.h)
