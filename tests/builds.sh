@@ -1,8 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # gcc and clang, each with Open MPI and MPICH, gcc on the HDF5 without MPI, clang on that of its MPI: unit tests, the
-# demo's basin on one rank, and on two, resumed on more ranks than there are cores, and then alone; with the same hash of
-# the state throughout.
+# demo's basin on one rank, and on two, resumed on more ranks than there are cores, and then alone; with the same hash
+# of the state throughout.
 #
 #     tests/builds.sh [FOLDER]      FOLDER takes 400 MB; tests/roots.sh calls it in Debian 12 and 13
 #
@@ -32,6 +32,7 @@ same() { # NAME FOLDER
 }
 
 case=cases/basin/basin-80.yml
+cores=$(nproc) # which follows OMP_NUM_THREADS
 export OMP_NUM_THREADS=1 GOMP_SPINCOUNT=5000 # as tests/run.sh has it
 for cc in gcc clang; do
   for mpi in openmpi mpich; do
@@ -43,7 +44,7 @@ for cc in gcc clang; do
     [ $mpi = mpich ] || MPIRUN="mpirun.openmpi --oversubscribe"
     export MPIRUN
     : >"$log"
-    make "${flags[@]}" -j"$(nproc)" all tests >>"$log" 2>&1 || { failed=$((failed + 1)) && echo "$name: no build" &&
+    make "${flags[@]}" -j"$cores" all tests >>"$log" 2>&1 || { failed=$((failed + 1)) && echo "$name: no build" &&
       continue; }
     "$build/bergtow" --version
     for test in "$build"/tests/{unit,physics}/test_*; do
@@ -55,7 +56,7 @@ for cc in gcc clang; do
     # shellcheck disable=SC2086 # one word an option
     count "$name, ranks" $MPIRUN -n 2 "$build/bergtow" run $case --steps 100 -o "$run" --force --quiet
     # shellcheck disable=SC2086
-    count "$name, more ranks than cores" $MPIRUN -n $(($(nproc) + 3)) "$build/bergtow" resume "$run" --steps 10 --quiet
+    count "$name, more ranks than cores" $MPIRUN -n $((cores + 3)) "$build/bergtow" resume "$run" --steps 10 --quiet
     count "$name, resume" "$build/bergtow" resume "$run" --steps 90 --quiet
     same "$name, resumed" "$run"
   done

@@ -3,10 +3,11 @@
 # From a bare Debian, as a new user has it: make demo, then make test, each of which installs what it lacks; then the
 # other compiler and the other MPI (tests/builds.sh). In a second one nothing but what the tutorials say, word by word.
 #
-#     tests/roots.sh [FOLDER [RELEASE...]]      as root, in roots of their own in FOLDER (6 GB a release): bookworm, trixie
+#     tests/roots.sh [FOLDER [RELEASE...]]      as root, in roots of their own in FOLDER (6 GB a release): bookworm,
+#                                               trixie
 #
-# A demo that takes more than 900 MB of the disk has failed, too. Needs mmdebstrap and the network. Takes the tree as it
-# is committed. Ends with `N passed, N failed`.
+# A demo that takes more than 900 MB of the disk has failed, too. Needs mmdebstrap, the network, and python3-h5py. Takes
+# the tree as it is committed. Ends with `N passed, N failed`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(mkdir -p "${1:-/tmp/bergtow-roots}" && cd "${1:-/tmp/bergtow-roots}" && pwd)

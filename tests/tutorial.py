@@ -96,8 +96,10 @@ class Reader:
             assert any(wanted.strip() in line for line in lines), f"not printed: {wanted}\nbut:\n{self.printed}"
 
 
-def pages():
-    return sorted((ROOT / "docs/tutorials").glob("*.md"))
+def pages(sources=ROOT):
+    found = sorted((Path(sources) / "docs/tutorials").glob("*.md"))
+    assert found, f"no tutorials in {sources}"
+    return found
 
 
 def follow(name, folder):
@@ -113,11 +115,11 @@ def follow(name, folder):
 
 def main(sources, *machine):
     failed = 0
-    for page in pages():
+    for page in pages(sources):
         try:
             Reader(Path(sources), Path("/root"), machine).follow(page)
             print(f"{page.name}: followed", flush=True)
-        except AssertionError as e:
+        except (AssertionError, subprocess.TimeoutExpired) as e:
             failed += 1
             print(f"{page.name}: {e}", flush=True)
     return failed > 0

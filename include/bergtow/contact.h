@@ -29,14 +29,15 @@ typedef struct bt_law_contact {
     const double *own;        ///< [BT_MAX_CONTACT_OWN] numbers of the law
     int n;                    ///< contact points, 1 or 2
     double gap[2];            ///< at the start of the step, m: of the outlines; after `bound` with what it has given
-    double length;            ///< between two points that may close, along the tangent, m; 0 with one of them
+    double length;            ///< between two points that take part, along the tangent, m; 0 with one of them
     double value[4];          ///< what the pair remembers; all 0 where it remembers nothing yet
     // after the solve; 0 before
     double load[2];           ///< mean normal load of the points over the step, N
     double grown[2];          ///< by how much the bodies go into each other in this step, at this law's bound, m
     // before and after
-    /// May the point close in this step? Whether one that may not is there at all depends on how far the search for
-    /// contacts looks, so that a bound must depend on the others alone
+    /// Does the point take part in this step: the outlines close there by the velocities before the contacts, or no
+    /// more than a slop later than at the other one? Whether any other point is there at all depends on how far the
+    /// search for contacts looks, so that no bound may depend on it
     bool closes[2];
 } bt_law_contact;
 

@@ -48,11 +48,10 @@ static bt_law_contact contact_of(const bt_world *w, int law, const bt_cell *t, b
 {
     const bt_contact *u = &t->contacts[j];
     bt_law_contact x = {.w = w, .a = u->a, .b = u->b, .own = own_of(&w->par, law), .n = u->n};
-    if (u->n == 0) return x;
-    const bt_closing c = bt_law_closing(w, t, j);
-    for (int i = 0; i < u->n; i++) x.gap[i] = t->gaps[j].gap[i], x.closes[i] = c.point[i];
+    const bool *closes = t->laws.limits[j].closes;
+    for (int i = 0; i < u->n; i++) x.gap[i] = t->gaps[j].gap[i], x.closes[i] = closes[i];
     // ran = ra × n, which changes along the tangent by the distance
-    if (c.n == 2) x.length = fabs(u->ran[1] - u->ran[0]);
+    if (closes[0] && closes[1]) x.length = fabs(u->ran[1] - u->ran[0]);
     if (record >= 0) memcpy(x.value, t->laws.memory[record].value, sizeof x.value);
     return x;
 }

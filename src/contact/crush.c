@@ -128,36 +128,6 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
-/// Part of the tangent line that a contact bears on.
-typedef struct {
-    double length, middle; ///< m, m from the centroid of a along the tangent
-} patch;
-
-/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent.
-static patch patch_of(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way)
-{
-    bt_overlap o;
-    bt_overlap_clip(w, m->a, m->b, part, -way * m->nx, -way * m->ny, &o);
-    double low = INFINITY, high = -INFINITY;
-    for (int k = 0; k < o.n; k++) {
-        const double t = m->nx * o.v[o.now][2 * k + 1] - m->ny * o.v[o.now][2 * k];
-        low = bt_min(low, t), high = bt_max(high, t);
-    }
-    return o.n > 0 ? (patch){high - low, 0.5 * (low + high)} : (patch){0, NAN};
-}
-
-/// Length of a patch that falls to point i of the manifold, of those that may close: uniform pressure on it, as forces
-/// at the points. NaN: to each alike.
-static double share_of(const bt_manifold *m, int i, patch c, const bool closes[2])
-{
-    if (m->n_points == 1 || !closes[1 - i]) return 1;
-    if (!closes[i]) return 0;
-    const double t0 = m->nx * m->p[0].ra[1] - m->ny * m->p[0].ra[0], t1 = m->nx * m->p[1].ra[1] - m->ny * m->p[1].ra[0];
-    if (!(t1 != t0) || isnan(c.middle)) return 0.5;
-    const double second = bt_max(0, bt_min(1, (c.middle - t0) / (t1 - t0)));
-    return i ? second : 1 - second;
-}
-
 static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     const bt_bodies *s = &w->bodies;
@@ -170,14 +140,14 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
     for (int i = 0; i < m->n_points; i++) g->gap[i] += l->depth[i];
-    const bt_closing c = bt_law_closing(w, t, j);
+    const bt_closing c = bt_law_closing(w, t, j, m);
     const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / c.n;
     const double way = bt_max(dt * c.approach - c.gap, LEAST_WAY * w->par.size);
-    const patch now = patch_of(w, p->part, m, c.gap + w->par.slop),
-                then = patch_of(w, p->part, m, c.gap + w->par.slop + way);
+    const bt_patch now = bt_law_patch(w, p->part, m, c.gap + w->par.slop),
+                then = bt_law_patch(w, p->part, m, c.gap + w->par.slop + way);
     for (int i = 0; i < m->n_points; i++) {
-        const double length = now.length * share_of(m, i, now, c.point),
-                     later = bt_max(length, then.length * share_of(m, i, then, c.point));
+        const double length = now.length * bt_law_share(m, i, now, &c),
+                     later = bt_max(length, then.length * bt_law_share(m, i, then, &c));
         l->flat[i] = bt_min(l->flat[i], per_length * bt_max(length, least));
         l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
         if (later <= bt_max(length, least)) continue; // as long as it gets
@@ -198,6 +168,14 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
     bt_sum_add(&number[CRUSHING], 1);
 }
 
+/// Where there is room, and the record does not have that feature yet.
+static void keep_depth(bt_memory *r, uint32_t feature, double depth)
+{
+    for (int i = 0; i < r->n_points; i++)
+        if (r->feature[i] == feature) return;
+    if (r->n_points < 2) r->feature[r->n_points] = feature, r->value[r->n_points++] = depth;
+}
+
 static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
     (void)number;
@@ -207,11 +185,15 @@ static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
     if (deepest == 0 || l->record[BT_LAW_RAFTING] >= 0) return 0;
     const bt_pair *p = &t->search.pairs[t->contacts[j].pair];
+    const bt_idx at = l->record[BT_LAW_CRUSHING];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
-    r.n_points = u->n;
-    for (int i = 0; i < u->n; i++) r.feature[i] = p->feature[i], r.value[i] = l->depth[i];
-    bt_law_put(t, l->record[BT_LAW_CRUSHING], &r);
-    return deepest;
+    for (int i = 0; i < u->n; i++)
+        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, p->feature[i], l->depth[i]);
+    // A point that was not found in this step is as deep as before.
+    for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++)
+        keep_depth(&r, t->laws.memory[at].feature[i], t->laws.memory[at].value[i]);
+    bt_law_put(t, at, &r);
+    return depth_of(&r);
 }
 
 const bt_law bt_crush_law = {.name = "crushing",

@@ -13,9 +13,9 @@
 // surfaces touch: the overlapping part for two edges; for a corner of angle φ that was crushed squarely to the depth d,
 // 2 d tan(φ/2); the chord for a disc. Two points share it as the forces at their places that are equivalent to a
 // uniform pressure on it: half each for two edges that lie on each other, nearly all for the end of an edge that has
-// come in tilted. It is looked at one slop deeper, so that edges that lie on each other bear from the first touch. No
-// contact is shorter than ℓ_min = least_length × h (half of it for each of two points), or a corner at its first touch
-// would bear nothing; assumed.
+// come in tilted; a point that takes no part (bt_closing) has none of it. It is looked at one slop deeper, so that
+// edges that lie on each other bear from the first touch. No contact is shorter than ℓ_min = least_length × h (half of
+// it for each of two points), or a corner at its first touch would bear nothing; assumed.
 //
 // Implicit length. A step can be long against the crushing itself (Δt = 5 s; a floe of 30 m stops in 1 s): with the
 // length of the start of the step a corner would go in by v Δt as if it bore nothing. So the bound is a function of the

@@ -235,6 +235,7 @@ static void find_awake(bt_world *w)
 void bt_contacts_detect(bt_world *w, bool again)
 {
     bt_cells *t = w->cells;
+    t->beside = bt_laws_on(&w->par) ? w->par.slop : 0; // contact/law.h, bt_closing
     bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];

@@ -73,6 +73,7 @@ typedef struct bt_limit {
     double grown[2]; ///< by how much the bodies go into each other in this step, m
     int32_t by[2];   ///< the law that set cap
     int32_t record[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
+    bool closes[2];  ///< bt_closing by the outlines, for laws that are added
 } bt_limit;
 
 /// Mean floe sizes by which two bodies may have parted and still remember each other; cells always reach that far.
@@ -161,17 +162,31 @@ bt_idx bt_law_find(const bt_cell *t, const bt_memory *names);
 /// Write record r: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
 void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r);
 
-/// Points of a contact that may close in this step.
+/// Points of a contact that take part in this step: those that close by the velocities before the contacts, and those
+/// that are no more than a slop farther than the nearest one, whatever closes them.
 typedef struct bt_closing {
     bool point[2];
     int n;           ///< how many: one at least
-    double gap;      ///< the least of all points, at least 0, m
-    double approach; ///< the fastest of those that may close, at least 0, m/s
+    double gap;      ///< the least of all points between the surfaces that are left, at least 0, m
+    double approach; ///< the fastest of those that take part, at least 0, m/s
 } bt_closing;
 
-/// Those of contact j of cell t, by its gaps as they are now. A point that may not close is there or not as the margin
-/// of the search has it, and with it the speeds of bodies nearby: what a contact bears must depend on the others alone.
-bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j);
+/// Those of contact j of cell t, made from manifold m, by its gaps as they are now. Any other point is there or not as
+/// the margin of the search has it, and with it the speeds of bodies nearby: what a contact bears must not depend on
+/// it.
+bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m);
+
+/// Part of the tangent line that a contact bears on.
+typedef struct bt_patch {
+    double length, middle; ///< m, m from the centroid of a along the tangent; NaN where they do not overlap
+} bt_patch;
+
+/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent.
+bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way);
+
+/// Share of a patch that falls to point i of the manifold, of those that take part: uniform pressure on it, as forces
+/// at the points. NaN: to each alike.
+double bt_law_share(const bt_manifold *m, int i, bt_patch p, const bt_closing *c);
 
 /// Names of the record that a law has, or would have, of pair p.
 static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int law)

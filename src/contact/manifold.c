@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
+#include "space/cells.h"
 #include "base/elementary.h"
 
 typedef struct {
@@ -138,8 +139,14 @@ static int facing_edge(const polygon *q, double nx, double ny)
     return facing;
 }
 
+/// How far points may be apart: from the other body; and, where a contact law asks for both ends of an edge, beyond the
+/// nearer one, however near that is to the margin (contact/law.h, bt_closing).
+typedef struct { double margin, beside; } bounds;
+
+static bounds bounds_of(const bt_world *w, double margin) { return (bounds){margin, w->cells->beside}; }
+
 /// Points of the incident polygon that face reference edge i; `flip` when the reference is b.
-static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, double margin,
+static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, bounds most,
                         bt_manifold *m)
 {
     double nx, ny;
@@ -164,7 +171,7 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     struct { double t, gap; uint32_t id; } ends[2] = {
         {tp, gp, (uint32_t)facing << 1}, {tq, gq, (uint32_t)other << 1}};
     const double span = tp - tq;
-    int kept = 0;
+    int n = 0, kept = 0;
     double depth = INFINITY;
     for (int k = 0; k < 2; k++) {
         double t = ends[k].t, bound = k == 0 ? length : 0;
@@ -178,10 +185,12 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
         } else if (t < 0 || t > length) {
             continue;
         }
-        if (ends[k].gap > margin) continue;
         depth = bt_min(depth, ends[k].gap);
-        ends[kept++] = ends[k];
+        ends[n++] = ends[k];
     }
+    if (depth > most.margin) return;
+    for (int k = 0; k < n; k++)
+        if (ends[k].gap <= bt_max(most.margin, depth + most.beside)) ends[kept++] = ends[k];
     // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
     // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
     for (int k = 0; k < kept; k++)
@@ -294,7 +303,8 @@ static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, i
 
     *m = (bt_manifold){.a = a, .b = b};
     const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
-    clip_points(ref, edge, inc, ref_b, d[0], d[1], margin, m);
+    const bounds most = bounds_of(w, margin);
+    clip_points(ref, edge, inc, ref_b, d[0], d[1], most, m);
     if (!(sep > 0)) {
         if (m->n_points == 0) deepest_point(ref, edge, inc, ref_b, d[0], d[1], m);
         return true;
@@ -306,7 +316,7 @@ static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, i
     int ca = 0, cb = 0, e = 0;
     bool of_b = false;
     if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) return join_corners(&pa, ca, &pb, cb, d, margin, m);
-    clip_points(of_b ? &pb : &pa, e, of_b ? &pa : &pb, of_b, d[0], d[1], margin, m);
+    clip_points(of_b ? &pb : &pa, e, of_b ? &pa : &pb, of_b, d[0], d[1], most, m);
     return m->n_points > 0;
 }
 
@@ -392,9 +402,9 @@ static double separation_that_counts(const part_of_body *p, const part_of_body *
 
 /// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count.
 static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
-                             double margin, bt_manifold *m)
+                             bounds most, bt_manifold *m)
 {
-    clip_points(&ref->p, i, &inc->p, flip, d[0], d[1], margin, m);
+    clip_points(&ref->p, i, &inc->p, flip, d[0], d[1], most, m);
     double nx, ny;
     edge_normal(&ref->p, i, &nx, &ny);
     if (edge_counts(inc, facing_edge(&inc->p, nx, ny))) return;
@@ -407,23 +417,23 @@ static void clip_what_counts(const part_of_body *ref, int i, const part_of_body 
 }
 
 /// The nearest features of two parts that are apart, where both count.
-static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], double margin,
+static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], bounds most,
                             bt_manifold *m)
 {
     int ca = 0, cb = 0, e = 0;
     bool of_b = false;
     m->n_points = 0;
     if (nearest_features(&a->p, &b->p, &ca, &cb, &e, &of_b)) {
-        return join_corners(&a->p, ca, &b->p, cb, d, margin, m) && corner_counts(a, ca, m->nx, m->ny) &&
+        return join_corners(&a->p, ca, &b->p, cb, d, most.margin, m) && corner_counts(a, ca, m->nx, m->ny) &&
                corner_counts(b, cb, -m->nx, -m->ny);
     }
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
     double nx, ny;
     edge_normal(&ref->p, e, &nx, &ny);
     if (!edge_counts(ref, e) || !corner_counts(inc, of_b ? ca : cb, -nx, -ny)) return false;
-    clip_what_counts(ref, e, inc, of_b, d, margin, m);
+    clip_what_counts(ref, e, inc, of_b, d, most, m);
     if (m->n_points == 0) deepest_point(&ref->p, e, &inc->p, of_b, d[0], d[1], m);
-    return m->p[0].gap <= margin;
+    return bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= most.margin;
 }
 
 bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
@@ -449,6 +459,7 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
     if (best > margin) return false;
 
     *m = (bt_manifold){.a = ia, .b = ib};
+    const bounds most = bounds_of(w, margin);
     best_axes s = {0};
     s.sa = separation_that_counts(&a, &b, &s.ia);
     s.sb = separation_that_counts(&b, &a, &s.ib);
@@ -458,13 +469,13 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
     const int edge = ref_b ? s.ib : s.ia;
     if (best > 0) {
         if (sep > 0 && sep >= best - tie) {
-            clip_what_counts(ref, edge, inc, ref_b, d, margin, m);
+            clip_what_counts(ref, edge, inc, ref_b, d, most, m);
             if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
         }
-        return nearest_contact(&a, &b, d, margin, m);
+        return nearest_contact(&a, &b, d, most, m);
     }
     if (!(-sep <= bt_max(tie, -DETOUR * best))) return false;
-    clip_what_counts(ref, edge, inc, ref_b, d, margin, m);
+    clip_what_counts(ref, edge, inc, ref_b, d, most, m);
     if (m->n_points == 0) deepest_point(&ref->p, edge, &inc->p, ref_b, d[0], d[1], m);
     return true;
 }

@@ -163,19 +163,6 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     return true;
 }
 
-/// Length that bears at each point of a pair that has not rafted.
-static void lengths_of(const bt_manifold *m, const bt_closing *c, double slop, double length[2])
-{
-    length[0] = length[1] = 0;
-    if (c->n < 2) return;
-    const double dx = m->p[1].ra[0] - m->p[0].ra[0], dy = m->p[1].ra[1] - m->p[0].ra[1],
-                 tilt = fabs(m->p[1].gap - m->p[0].gap);
-    const double all = fabs(m->nx * dy - m->ny * dx), share = tilt > slop ? slop / tilt : 1;
-    const int near = m->p[1].gap < m->p[0].gap;
-    length[near] = all * share * (1 - 0.5 * share);
-    length[1 - near] = all * share * 0.5 * share;
-}
-
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
 static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
@@ -197,12 +184,14 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
         return;
     }
     const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
-    const bt_closing c = bt_law_closing(w, t, j);
-    double length[2];
-    if (at >= 0) length[0] = length[1] = bt_hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]); // L/2
-    else lengths_of(m, &c, w->par.slop, length);
-    for (int i = 0; i < m->n_points; i++)
-        bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length[i], h / c.n), BT_LAW_RAFTING);
+    const bt_closing c = bt_law_closing(w, t, j, m);
+    bt_patch edge = {0, NAN}; // of a pair that has rafted: its two points take half of the chord, L/4 from its middle
+    if (at >= 0) edge.length = 2 * bt_hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]);
+    else edge = bt_law_patch(w, p->part, m, c.gap + w->par.slop);
+    for (int i = 0; i < m->n_points; i++) {
+        const double length = edge.length * bt_law_share(m, i, edge, &c);
+        bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
+    }
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------

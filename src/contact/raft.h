@@ -27,8 +27,8 @@
 // overlapping for nothing. The gradient falls to 0 where a floe is wholly under, and it may come out behind.
 //
 // First touch. A pair that has not rafted has the contact points of its outlines, and the same bound with the length
-// that bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h
-// (assumed), or a corner would bear nothing; two points that may both close in the step share it.
+// that bears: of two edges, the part whose gaps differ by no more than the slop, shared as in crush.h. No contact is
+// shorter than h (assumed), or a corner would bear nothing.
 //
 // Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they
 // overlap, friction of at most

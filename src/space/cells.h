@@ -172,6 +172,8 @@ typedef struct bt_cells {
     double heaviest;                ///< largest mass, kg
     bool rebounds;                  ///< some body has a restitution
     double margin_max;              ///< largest margin that these cells allow, m
+    /// how much farther than the nearest point of a contact the other one may be, whatever the margin, m
+    double beside;
     int32_t low_x, low_y, n_x, n_y; ///< the box of cells that hold floes
     /// cells around a periodic direction, 0 = open; 1 = one cell, its own neighbour nowhere
     int32_t wrap_x, wrap_y;

@@ -131,6 +131,142 @@ static void the_margin_of_the_search(void **state)
     }
 }
 
+/// The only contact of floe 0 with the last body; its cell in *at.
+static bt_idx contact_with_last(bt_world *w, bt_cell **at)
+{
+    const bt_idx one = bt_world_index(w, 0), other = bt_world_index(w, w->bodies.n - 1);
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+            const bt_contact *u = &w->cells->cell[k].contacts[j];
+            *at = &w->cells->cell[k];
+            if (bt_min(u->a, u->b) == bt_min(one, other) && bt_max(u->a, u->b) == bt_max(one, other)) return j;
+        }
+    fail();
+    return -1;
+}
+
+/// Which points take part: by the speed before the step and by the free one, and what lies beside the nearest.
+static void points_that_take_part(void **state)
+{
+    (void)state;
+    bt_params p = params(0.01);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    add_square(w, -0.5, 0.1, 0.1);
+    scene_wall(w, 0, -50, 5, 50, 0);
+    bt_world_step(w);
+    bt_cell *t = NULL;
+    const bt_idx j = contact_with_last(w, &t);
+    const struct { double before, free, gap[2], outline[2]; bool closes[2]; double least, approach; } at[] = {
+        {0, 0, {0, 5e-4}, {0, 5e-4}, {true, true}, 0, 0},                 // within the slop
+        {0, 0, {0.02, 0.0209}, {0.02, 0.0209}, {true, true}, 0.02, 0},    // beside the nearest, whatever closes them
+        {0, 0, {0.02, 0.0211}, {0.02, 0.0211}, {true, false}, 0.02, 0},   // farther
+        {0.5, 0.1, {0, 4e-3}, {0, 4e-3}, {true, true}, 0, 0.5},           // 5 mm a step, before
+        {0.1, 0.5, {4e-3, 0}, {4e-3, 0}, {true, true}, 0, 0.5},           // and without contacts
+        {0.5, 0.1, {0, 5.5e-3}, {0, 5.5e-3}, {true, false}, 0, 0.5},      // not slop and way together
+        {0.1, 0.1, {0.02, 0}, {-0.01, -0.03}, {false, true}, 0, 0.1},     // crushed
+        {0.1, 0.1, {3e-3, 2e-3}, {-0.02, 0}, {true, true}, 2e-3, 0.1},    // the outlines' nearest, and the surfaces'
+        {-1, -1, {3e-3, -1e-3}, {3e-3, -1e-3}, {false, true}, 0, 0},      // they part
+    };
+    for (size_t k = 0; k < sizeof at / sizeof *at; k++) {
+        const bt_idx floe = bt_world_index(w, 0);
+        w->bodies.vel_start[floe] = (bt_vel){at[k].before, 0, 0, 0};
+        w->bodies.vel_free[floe] = (bt_vel){at[k].free, 0, 0, 0};
+        bt_manifold m = {.n_points = 2};
+        for (int i = 0; i < 2; i++) t->gaps[j].gap[i] = at[k].gap[i], m.p[i].gap = at[k].outline[i];
+        const bt_closing c = bt_law_closing(w, t, j, &m);
+        for (int i = 0; i < 2; i++)
+            if (c.point[i] != at[k].closes[i]) fail_msg("row %zu, point %d", k, i);
+        assert_int_equal(c.n, at[k].closes[0] + at[k].closes[1]);
+        CHECK_CLOSE(c.gap, at[k].least, 1e-15);
+        CHECK_CLOSE(c.approach, at[k].approach, 1e-12);
+    }
+    bt_world_free(w);
+}
+
+/// A point beside the nearest one is found though it lies beyond the margin, where a law bounds the load; rigid
+/// contacts need none.
+static void a_point_beside_the_nearest_is_found(void **state)
+{
+    (void)state;
+    for (int crushes = 0; crushes < 2; crushes++) {
+        bt_params p = params(0.01);
+        p.slop = 1e-3;
+        if (!crushes) p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = 0;
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(1, v);
+        const double yaw = 6e-4, corner = 0.5 * (cos(yaw) + sin(yaw));
+        add_floe(w, 4, v, -corner - 0.9e-3, 0, yaw, 1e-4, 0.1); // 0.9 and 1.5 slops off
+        scene_wall(w, 0, -50, 5, 50, 0);
+        bt_world_step(w);
+        bt_cell *t = NULL;
+        const bt_idx j = contact_with_last(w, &t);
+        assert_int_equal(t->contacts[j].n, 1 + crushes);
+        bt_world_free(w);
+    }
+}
+
+/// A floe at rest is pushed across a gap and shut against a wall by another one: whether its edge lies true or is
+/// turned a little, both of its ends bear.
+static void pushed_shut(void **state)
+{
+    (void)state;
+    const double h = 0.1, dt = 0.01, yaw[] = {0, 1e-12, -1e-12, 1e-4};
+    for (int i = 0; i < 4; i++) {
+        bt_params p = params(dt);
+        p.slop = 1e-3;
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.505, 0, yaw[i], 0, h);
+        bt_body_def d = scene_prism(4, v, sheet);
+        d.motion = BT_KINEMATIC, d.x = -1.505, d.vx = 0.6;
+        bt_world_add(w, &d);
+        scene_wall(w, 0, -50, 5, 50, 0);
+        bt_world_step(w);
+        bt_cell *t = NULL;
+        const bt_idx j = contact_with_last(w, &t);
+        const bt_limit *l = &t->laws.limits[j];
+        assert_int_equal(t->contacts[j].n, 2);
+        for (int k = 0; k < 2; k++) CHECK_CLOSE(l->flat[k], 0.5 * pressure * h * dt, 0.06 * pressure * h * dt);
+        bt_world_free(w);
+    }
+}
+
+/// Two corners are crushed; the floe is turned until one is farther off than the search looks. Found or not, it remains
+/// as deep.
+static void a_corner_out_of_sight_is_not_forgotten(void **state)
+{
+    (void)state;
+    for (int fast = 0; fast < 2; fast++) {
+        bt_params p = params(1e-3);
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.5, 0, 0, 2, 0.1);
+        if (fast) add_floe(w, 4, v, -3, 0, 0, -30, 0.1);
+        scene_wall(w, 0, -50, 5, 50, 0);
+        for (int s = 0; s < 100; s++) bt_world_step(w);
+        const bt_idx floe = bt_world_index(w, 0);
+        bt_cell *t = NULL;
+        contact_with_last(w, &t);
+        const double deep = t->laws.memory[0].value[0];
+        assert_true(t->laws.n_memory == 1 && t->laws.memory[0].n_points == 2 && deep > 0.02);
+        *vel(w, 0) = (bt_vel){1e-6, 0, 0, 0};
+        // about the corner that remains where it is
+        w->bodies.pose[floe].yaw = 0.06, w->bodies.pose[floe].x -= 0.5 * (cos(0.06) + sin(0.06)) - 0.5;
+        bt_bodies_turn(&w->bodies, floe);
+        w->bodies.disturbed[floe] = 1;
+        bt_world_step(w);
+        const bt_idx j = contact_with_last(w, &t);
+        assert_int_equal(t->contacts[j].n, 1 + fast);
+        assert_true(t->laws.memory[0].n_points == 2);
+        for (int i = 0; i < 2; i++) CHECK_CLOSE(t->laws.memory[0].value[i], deep, 0.01 * deep);
+        bt_world_free(w);
+    }
+}
+
 /// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed,
 /// over the part, with the reduced mass; they end with the common velocity.
 static void two_floes(void **state)
@@ -393,7 +529,7 @@ static void laws_of_a_jam(void **state)
             }
         }
     }
-    assert_true(crushed > 100 && rafted > 100 && unconverged > 100);
+    assert_true(crushed > 100 && rafted > 100 && unconverged > 50);
     bt_world_free(w);
 }
 
@@ -435,6 +571,10 @@ int main(void)
         cmocka_unit_test(pressed_against_a_wall),
         cmocka_unit_test(stop_at_constant_force),
         cmocka_unit_test(the_margin_of_the_search),
+        cmocka_unit_test(points_that_take_part),
+        cmocka_unit_test(a_point_beside_the_nearest_is_found),
+        cmocka_unit_test(pushed_shut),
+        cmocka_unit_test(a_corner_out_of_sight_is_not_forgotten),
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
         cmocka_unit_test(friction_from_the_limit),

@@ -163,6 +163,35 @@ static void the_margin_of_the_search(void **state)
     }
 }
 
+/// A floe at rest is pushed across a gap and shut against an edge by a plate: whether it lies true or is turned a
+/// little, it bears along its whole edge, and both ends alike.
+static void pushed_shut(void **state)
+{
+    (void)state;
+    const double a = 10, yaw[] = {0, 1e-12, -1e-12, 1e-4};
+    for (int i = 0; i < 4; i++) {
+        bt_params p = params(0.1);
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(a, v);
+        add(w, BT_DYNAMIC, 4, v, 0.5 * a + 0.05, 0, yaw[i], h);
+        set_speed(w, add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), -0.6);
+        add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
+        bt_world_step(w);
+        int seen = 0;
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+                const bt_limit *l = &w->cells->cell[k].laws.limits[j];
+                if (w->cells->cell[k].contacts[j].n < 2 || isinf(l->cap[0])) continue;
+                seen++;
+                for (int e = 0; e < 2; e++)
+                    CHECK_CLOSE(l->cap[e], 0.5 * edge_load() * a * p.dt, 0.06 * edge_load() * a * p.dt);
+            }
+        assert_int_equal(seen, 1);
+        bt_world_free(w);
+    }
+}
+
 /// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they
 /// meet as at first.
 static void out_behind(void **state)
@@ -345,6 +374,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_squares),
         cmocka_unit_test(the_margin_of_the_search),
+        cmocka_unit_test(pushed_shut),
         cmocka_unit_test(out_behind),
         cmocka_unit_test(confined_row),
         cmocka_unit_test(apex_under_an_edge),
