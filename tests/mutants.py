@@ -254,8 +254,9 @@ MUTANTS = {
         ("bt_domain_maxima(w, most, BT_LAWS);", "", "deepest of one rank"),
         ("totals->most = bt_max(totals->most, most[BT_LAW_CRUSHING]);", "", "crushed depth is not reported"),
     ]),
-    "src/contact/manifold.c": (["physics/test_crush"], [
+    "src/contact/manifold.c": (["physics/test_crush", "physics/test_rafting", "scenes:rafting,rafting_press"], [
         ("bt_max(most.margin, depth + most.beside)", "most.margin", "a point beside the nearest one is not found"),
+        ("(tilt > most.beside ? most.beside / tilt : 1)", "1", "a tilted edge bears along its whole length"),
     ]),
     "src/contact/closing.c": (["physics/test_crush", "physics/test_rafting"], [
         ("gap[i] <= bt_max(w->par.dt * approach, slop) ||", "true ||",
@@ -314,8 +315,10 @@ MUTANTS = {
         ("bt_max(length, h / c.n)", "length", "a corner without strength"),
         ("bt_max(length, h / c.n)", "bt_max(length, h / m->n_points)",
          "the margin of the search decides what an edge bears"),
-        ("edge = bt_law_patch(w, p->part, m, c.gap + w->par.slop);", ";", "no edge bears on more than its thickness"),
-        ("edge.length = 2 * bt_hypot", "edge.length = bt_hypot", "half of the chord bears"),
+        ("return (bt_patch){m->flush, along(m, near)", "return (bt_patch){0, along(m, near)",
+         "no edge bears on more than its thickness"),
+        ("(to < 0 ? -half : half)", "(to < 0 ? half : -half)", "shares of the length"),
+        ("(bt_patch){2 * fabs(along", "(bt_patch){fabs(along", "half of the chord bears"),
         ("u->ln[i] >= l->cap[i]", "u->ln[i] >= 2 * l->cap[i]", "rafting never begins"),
         ("t->laws.memory[at].value[3] = u->lt;", "", "friction of sheets starts at zero"),
         ("return ice && !towed &&", "return ice &&", "the body rafts"),

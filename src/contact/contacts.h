@@ -28,6 +28,9 @@ typedef struct bt_manifold {
     bt_idx a, b;      ///< gid[a] < gid[b]
     int n_points;     ///< 1 or 2
     double nx, ny;    ///< unit normal from a to b
+    /// of two edges, the length along the tangent that is no more than cells->beside farther apart than the nearest
+    /// point, m, whether the other end is a point of the contact or not; 0 = a corner, or no law bounds contacts
+    double flush;
     bt_point p[2];
 } bt_manifold;
 

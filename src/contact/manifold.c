@@ -167,6 +167,7 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
 
     m->nx = flip ? -nx : nx;
     m->ny = flip ? -ny : ny;
+    m->flush = 0;
     const uint32_t base = ((uint32_t)flip << 31) | ((uint32_t)i << 20);
     struct { double t, gap; uint32_t id; } ends[2] = {
         {tp, gp, (uint32_t)facing << 1}, {tq, gq, (uint32_t)other << 1}};
@@ -189,6 +190,10 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
         ends[n++] = ends[k];
     }
     if (depth > most.margin) return;
+    if (n == 2 && most.beside > 0) {
+        const double tilt = fabs(ends[0].gap - ends[1].gap);
+        m->flush = fabs(ends[0].t - ends[1].t) * (tilt > most.beside ? most.beside / tilt : 1);
+    }
     for (int k = 0; k < n; k++)
         if (ends[k].gap <= bt_max(most.margin, depth + most.beside)) ends[kept++] = ends[k];
     // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
@@ -232,6 +237,7 @@ static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, con
     world_vertex(b, cb, y);
     const double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
     if (gap > margin || gap == 0) return false;
+    m->flush = 0;
     m->nx = (y[0] - x[0]) / gap;
     m->ny = (y[1] - x[1]) / gap;
     set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],

@@ -163,6 +163,20 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     return true;
 }
 
+static double along(const bt_manifold *m, int i) { return m->nx * m->p[i].ra[1] - m->ny * m->p[i].ra[0]; }
+
+/// Of a pair that has rafted: its two points, L/4 from the middle, take half each.
+static bt_patch chord_of(const bt_manifold *m) { return (bt_patch){2 * fabs(along(m, 1) - along(m, 0)), NAN}; }
+
+/// Of one that has not: what lies flush of its edges, from the nearer point on.
+static bt_patch flush_part(const bt_manifold *m)
+{
+    if (m->n_points < 2) return (bt_patch){m->flush, NAN};
+    const int near = m->p[1].gap < m->p[0].gap;
+    const double half = 0.5 * m->flush, to = along(m, 1 - near) - along(m, near);
+    return (bt_patch){m->flush, along(m, near) + (to < 0 ? -half : half)};
+}
+
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
 static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
@@ -185,9 +199,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     }
     const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
     const bt_closing c = bt_law_closing(w, t, j, m);
-    bt_patch edge = {0, NAN}; // of a pair that has rafted: its two points take half of the chord, L/4 from its middle
-    if (at >= 0) edge.length = 2 * bt_hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]);
-    else edge = bt_law_patch(w, p->part, m, c.gap + w->par.slop);
+    const bt_patch edge = at >= 0 ? chord_of(m) : flush_part(m);
     for (int i = 0; i < m->n_points; i++) {
         const double length = edge.length * bt_law_share(m, i, edge, &c);
         bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
