@@ -85,6 +85,8 @@ static bool applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_of
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
+enum { UNSEEN = 2 }; // value[UNSEEN + i]: 1 = point i was not found when the record was written: as deep as before
+
 static bool keeps(const bt_world *w, bt_memory *r) { return bt_law_near(w, r); }
 
 static double depth_of(const bt_memory *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
@@ -103,7 +105,8 @@ static int by_bodies(const void *p, const void *q)
 }
 
 /// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on
-/// from part to part is sliding.
+/// from part to part is sliding. So is a point that comes back into sight: meanwhile they may have crushed each other
+/// deeper under another name.
 static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold *m, bt_limit *l)
 {
     if (t->laws.n_memory == 0) return;
@@ -122,7 +125,8 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
     for (int i = 0; i < m->n_points; i++) {
         l->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
-            if (own->feature[j] == m->p[i].feature) l->depth[i] = own->value[j];
+            if (own->feature[j] == m->p[i].feature)
+                l->depth[i] = own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], l->depth[i]) : own->value[j];
     }
 }
 
@@ -169,11 +173,13 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 }
 
 /// Where there is room, and the record does not have that feature yet.
-static void keep_depth(bt_memory *r, uint32_t feature, double depth)
+static void keep_depth(bt_memory *r, uint32_t feature, double depth, bool unseen)
 {
     for (int i = 0; i < r->n_points; i++)
         if (r->feature[i] == feature) return;
-    if (r->n_points < 2) r->feature[r->n_points] = feature, r->value[r->n_points++] = depth;
+    if (r->n_points == 2) return;
+    r->feature[r->n_points] = feature, r->value[r->n_points] = depth, r->value[UNSEEN + r->n_points] = unseen;
+    r->n_points++;
 }
 
 static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
@@ -181,17 +187,21 @@ static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     (void)number;
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
+    const bt_idx at = l->record[BT_LAW_CRUSHING];
+    if (l->record[BT_LAW_RAFTING] >= 0) return 0;
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
-    if (deepest == 0 || l->record[BT_LAW_RAFTING] >= 0) return 0;
+    if (deepest == 0) return at >= 0 ? depth_of(&t->laws.memory[at]) : 0;
     const bt_pair *p = &t->search.pairs[t->contacts[j].pair];
-    const bt_idx at = l->record[BT_LAW_CRUSHING];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
+    // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
     for (int i = 0; i < u->n; i++)
-        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, p->feature[i], l->depth[i]);
-    // A point that was not found in this step is as deep as before.
-    for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++)
-        keep_depth(&r, t->laws.memory[at].feature[i], t->laws.memory[at].value[i]);
+        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, p->feature[i], l->depth[i], false);
+    for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++) {
+        const bt_memory *before = &t->laws.memory[at];
+        if (before->value[i] > 0) keep_depth(&r, before->feature[i], before->value[i], true);
+    }
+    for (int i = 0; i < u->n; i++) keep_depth(&r, p->feature[i], l->depth[i], false);
     bt_law_put(t, at, &r);
     return depth_of(&r);
 }

@@ -35,7 +35,9 @@
 // next edge) has the overlap that is there, at most the pair's deepest crush, as its depth: sliding neither crushes nor
 // brings overlap back. So a depth is blunt ice of this pair alone: a third floe meets the outline as it was.
 //
-// Not done: crushed ice does not pile up, extrude or lose mass; a pressure that falls with the area of contact.
+// Not done: a record holds two points, so that a crushed corner which was not found is forgotten once the other end has
+// been crushed under two names; its depth then is the overlap that is there, as for a new point.
+// Crushed ice does not pile up, extrude or lose mass; a pressure that falls with the area of contact.
 // Surfaces that were crushed askew stay tilted against each other, and sliding along them changes gaps that the normal
 // rows do not see: such steps leave overlap (up to 2.5 % of a floe in the basin's jams, more between floes in parts),
 // which the position projection takes back in the steps after.
@@ -44,7 +46,7 @@
 
 #include "contact/law.h"
 
-/// Its record: a depth for each contact feature, m.
+/// Its record: for each of two contact features a depth, m, and whether it is of an earlier step (1) than the last.
 extern const bt_law bt_crush_law;
 
 /// Its numbers of the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.

@@ -267,6 +267,41 @@ static void a_corner_out_of_sight_is_not_forgotten(void **state)
     }
 }
 
+static void drive(bt_world *w, double vx, double vy, int steps, double *overlap)
+{
+    for (int s = 0; s < steps; s++) {
+        *vel(w, 0) = (bt_vel){vx, vy, 0, 0};
+        bt_world_step(w);
+        *overlap = bt_max(*overlap, w->stats.overlap);
+    }
+}
+
+/// A corner is crushed, slides off the end of the edge and gets another name there, is crushed deeper, and slides back:
+/// that the first name was less deep brings no overlap back.
+static void sliding_back_brings_no_overlap(void **state)
+{
+    (void)state;
+    const double yaw = -0.06;
+    bt_params p = params(1e-3);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    double v[8], overlap = 0;
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, sheet);
+    d.motion = BT_KINEMATIC, d.thickness = 0.1;
+    d.x = -0.5 * (cos(yaw) + sin(-yaw)) - 0.5 - 1e-3, d.y = -0.1, d.yaw = yaw;
+    bt_world_add(w, &d);
+    bt_body_def heavy = scene_prism(4, v, 1e4 * sheet);
+    heavy.thickness = 0.1;
+    bt_world_add(w, &heavy);
+    drive(w, 1, 0, 25, &overlap);
+    drive(w, 0, 1, 200, &overlap);
+    drive(w, 1, 0, 20, &overlap);
+    drive(w, 0, -1, 200, &overlap);
+    assert_true(scene_law(w, "crushed_depth") > 0.03 && overlap < 2 * p.slop);
+    bt_world_free(w);
+}
+
 /// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed,
 /// over the part, with the reduced mass; they end with the common velocity.
 static void two_floes(void **state)
@@ -575,6 +610,7 @@ int main(void)
         cmocka_unit_test(a_point_beside_the_nearest_is_found),
         cmocka_unit_test(pushed_shut),
         cmocka_unit_test(a_corner_out_of_sight_is_not_forgotten),
+        cmocka_unit_test(sliding_back_brings_no_overlap),
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
         cmocka_unit_test(friction_from_the_limit),
