@@ -43,7 +43,7 @@ double bt_law_share(const bt_manifold *m, int i, bt_patch p, const bt_closing *c
 {
     if (m->n_points == 1 || !c->point[1 - i]) return 1;
     if (!c->point[i]) return 0;
-    const double t0 = m->nx * m->p[0].ra[1] - m->ny * m->p[0].ra[0], t1 = m->nx * m->p[1].ra[1] - m->ny * m->p[1].ra[0];
+    const double t0 = bt_law_along(m, 0), t1 = bt_law_along(m, 1);
     if (!(t1 != t0) || isnan(p.middle)) return 0.5;
     const double second = bt_max(0, bt_min(1, (p.middle - t0) / (t1 - t0)));
     return i ? second : 1 - second;

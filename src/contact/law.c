@@ -88,7 +88,8 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     *l = (bt_limit){
         .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}};
     for (int law = 0; law < BT_ALL_LAWS; law++) l->record[law] = -1;
-    if (m->n_points > 0) memcpy(l->closes, bt_law_closing(w, t, j, m).point, sizeof l->closes);
+    if (m->n_points > 0 && bt_n_contact_laws() > 0)
+        memcpy(l->closes, bt_law_closing(w, t, j, m).point, sizeof l->closes);
     // The last first: what has rafted is not measured from what was crushed before.
     for (int law = BT_ALL_LAWS - 1; m->n_points > 0 && law >= BT_LAWS; law--)
         if (bt_law_on(&w->par, law) && bt_added_applies(w, law, m->a, m->b)) bt_added_bound(w, law, t, j, p);

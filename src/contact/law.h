@@ -176,6 +176,9 @@ typedef struct bt_closing {
 /// it.
 bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m);
 
+/// Place of point i along the tangent, from the centroid of a, m.
+static inline double bt_law_along(const bt_manifold *m, int i) { return m->nx * m->p[i].ra[1] - m->ny * m->p[i].ra[0]; }
+
 /// Part of the tangent line that a contact bears on.
 typedef struct bt_patch {
     double length, middle; ///< m, m from the centroid of a along the tangent; NaN where they do not overlap

@@ -163,18 +163,19 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     return true;
 }
 
-static double along(const bt_manifold *m, int i) { return m->nx * m->p[i].ra[1] - m->ny * m->p[i].ra[0]; }
-
 /// Of a pair that has rafted: its two points, L/4 from the middle, take half each.
-static bt_patch chord_of(const bt_manifold *m) { return (bt_patch){2 * fabs(along(m, 1) - along(m, 0)), NAN}; }
+static bt_patch chord_of(const bt_manifold *m)
+{
+    return (bt_patch){2 * fabs(bt_law_along(m, 1) - bt_law_along(m, 0)), NAN};
+}
 
 /// Of one that has not: what lies flush of its edges, from the nearer point on.
 static bt_patch flush_part(const bt_manifold *m)
 {
     if (m->n_points < 2) return (bt_patch){m->flush, NAN};
     const int near = m->p[1].gap < m->p[0].gap;
-    const double half = 0.5 * m->flush, to = along(m, 1 - near) - along(m, near);
-    return (bt_patch){m->flush, along(m, near) + (to < 0 ? -half : half)};
+    const double half = 0.5 * m->flush, from = bt_law_along(m, near), to = bt_law_along(m, 1 - near);
+    return (bt_patch){m->flush, from + (to < from ? -half : half)};
 }
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
