@@ -20,7 +20,6 @@ from scipy import stats
 import stat_sensitivity
 
 LEAST = 8            # conditions
-TRUSTED_Q2 = 0.7     # below, shares are a rough guide
 
 
 @dataclass(frozen=True)
