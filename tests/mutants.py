@@ -135,7 +135,7 @@ MUTANTS = {
     "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py::test_bodies_that_cannot_give_way",
                              "physics/test_impacts",
                              "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
-                             "parallel/test_ranks.py"], [
+                             "parallel/test_ranks.py::test_the_same_bits[jam-2-1]"], [
         ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
         ("s->root[bt_islands_root(s, u->b)] = bt_islands_root(s, u->a);", "", "every floe an island"),
         ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
