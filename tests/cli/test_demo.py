@@ -31,7 +31,8 @@ def test_the_demo_needs_only_what_it_has_installed(tmp_path):
         (tmp_path / "hidden" / name).mkdir(parents=True)
         (tmp_path / "hidden" / name / "__init__.py").write_text(f"raise ImportError('{name} is hidden', name='{name}')")
     run = tmp_path / "run"
-    subprocess.run([BERGTOW, "run", ROOT / "cases/basin/basin-80.yml", "-o", run, "--steps", "20", "--quiet"], check=True)
+    case = ROOT / "cases/basin/basin-80.yml"
+    subprocess.run([BERGTOW, "run", case, "-o", run, "--steps", "20", "--quiet"], check=True)
     said = subprocess.run(["make", "-n", "demo"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     scripts = [line.replace("out/demo", str(run)).split() for line in said.splitlines() if " postproc/" in line]
     assert len(scripts) >= 3
