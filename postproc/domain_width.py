@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The width that a domain of periodic sides needs for its ice, by the rule of `bergtow check`: a load that rests on the
-periodic images of the body is none to design for. Walls are part of the question, and stay where they are."""
+periodic images of the body is none to design for. Walls are part of the question, and stay where they are; so does the
+length of a domain in which the tow goes along y, which has a warning."""
 import json
 import math
 
@@ -30,7 +31,9 @@ def stays(case, replaced):
 def wide_enough(domain):
     """The width, m, of three digits, that the ice in a domain needs; None where it is there, or cannot be had."""
     there, needed = domain["body_widths"], domain["body_widths_needed"]
-    if domain["sides"] != "periodic images" or not there or not needed or needed <= there:
+    if domain["across"] != "domain.width" or domain["sides"] != "periodic images":
+        return None
+    if not there or not needed or needed <= there:
         return None
     width = domain["width_m"] * needed / there
     digit = 10.0 ** (math.floor(math.log10(width)) - 2)

@@ -29,7 +29,11 @@
 //   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no
 //                    ice resistance
 //
-// Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
+// ΔV of a run is measured: the mean over its window of the velocity of the body less that of undisturbed ice, the mean
+// floe in free drift (series speed_through_ice, leeway_through_ice); for the open water less that of the water. So a
+// vessel that cannot hold its speed counts, and wind that drives the ice along. Before a run ΔV is what is ordered:
+// V_tow − U, where U of the water is its mean over the run, and of the ice its free drift at the start, or the water's
+// where wind or current change (bt_estimate_ordered).
 //
 // Left out. The other regression that is known here, R = a ρ_i W h V² A^1.5 / Fr^b [Huang et al. 2021], has constants
 // of a ship and its floes that were found only in the source of a third, without range. It stays out until the paper is
@@ -75,7 +79,9 @@ typedef struct bt_estimate_input {
     double thickness;        ///< h, weighted with area, m
     double floe_radius;      ///< r, weighted with area, m
     double width;            ///< W, m
-    double speed, along;     ///< |ΔV| and ΔV·d, m/s; NaN: nothing is towed
+    double speed, along;     ///< |ΔV| and ΔV·d through the ice, m/s; NaN: nothing is towed
+    double water_speed, water_along; ///< the same through the water
+    double ordered;          ///< ΔV·d of the speed that the tow asks for through the ice, m/s; NaN: nothing is towed
     double restitution;      ///< e, ice on body
     bool ship;               ///< the body is a ship
     double ice_density, water_density; ///< kg/m³
@@ -126,8 +132,12 @@ double bt_estimate_strength(const bt_estimate_input *in);
 bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in);
 
 /// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body,
-/// or tow, speed and along are NaN. The case has been checked (bt_case_finish).
+/// or tow, the speeds are NaN; else as ordered, the ice going with the water. The case has been checked
+/// (bt_case_finish).
 void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in);
+
+/// The same with ice that drifts at ice[2], m/s; NaN: with the water.
+void bt_estimate_ordered(const bt_case *c, const double ice[2], bt_estimate_input *in);
 
 /// Area-weighted means of a field: thickness and radius of the circle of a floe's area, m. 0 without floes.
 void bt_estimate_field(const bt_field *f, double *thickness, double *radius);

@@ -156,6 +156,7 @@ struct bt_tow;
 struct bt_domain;
 struct bt_exchange;
 struct bt_window;
+struct bt_undisturbed;
 struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
@@ -212,6 +213,7 @@ typedef struct bt_world {
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still
+    struct bt_undisturbed *undisturbed; ///< NULL = no body is towed (step/undisturbed.h)
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)

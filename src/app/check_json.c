@@ -16,6 +16,7 @@ static void write_domain(bt_json *j, const bt_case *c, const bt_check_ice *n)
     bt_json_open(j, "domain", '{');
     bt_json_number(j, "length_m", c->domain.length);
     bt_json_number(j, "width_m", c->domain.width);
+    bt_json_string(j, "across", a.key);
     bt_json_string(j, "sides", a.sides);
     bt_json_number(j, "body_widths", a.bodies);
     bt_json_number(j, "body_widths_needed", a.needed);

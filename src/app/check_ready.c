@@ -102,8 +102,23 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
             c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / bt_case_reference_speed(c));
 }
 
+/// A moving window takes in ice ahead only; water that is as fast has been refused (case/case_window.c).
+static void warn_of_drift(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+{
+    if (c->domain.ends != BT_BOUND_MOVING || n->count < 1 || !(c->tow.speed > 0)) return;
+    double ice[2], body[2];
+    bt_setup_drift(c, n->size, n->thickness, ice, body);
+    const double along = bt_cos(c->tow.direction), drift = along > 0 ? ice[0] : -ice[0];
+    if (drift >= c->tow.speed * fabs(along))
+        bt_errors_add(warnings,
+                      "domain.ends: wind and water carry the ice at %.3g m/s along x, as fast as the tow, and a moving "
+                      "window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
+                      drift);
+}
+
 void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
+    warn_of_drift(c, n, warnings);
     const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
     bt_arch_warn(&arch, warnings);
     const bt_packing packing = bt_packing_of(c, n->concentration);

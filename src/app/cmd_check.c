@@ -23,6 +23,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     bt_cmd_case file;
@@ -279,7 +280,7 @@ static void print_warnings(const char *path, const bt_errors *w)
 static void print_width(const bt_case *c, const bt_check_ice *n)
 {
     const bt_arch a = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
-    printf("domain width         ");
+    printf("%-20s ", strcmp(a.key, "domain.width") ? "domain length" : "domain width");
     if (isfinite(a.bodies)) printf("%.3g body widths, ", a.bodies);
     if (isfinite(a.floes)) printf("%.3g floe sizes, ", a.floes);
     printf("%s: arches of %s %s", a.sides, bt_arch_floes(&a), a.possible ? "POSSIBLE" : "not expected");

@@ -4,7 +4,9 @@
 #include "bergtow/field.h"
 #include "case/case_derived.h"
 #include "app/cmd.h"
+#include "force/environment.h"
 #include "output/estimate_text.h"
+#include "run/setup.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -53,6 +55,18 @@ static void print_table(const options *o, const bt_case *c, const bt_estimate_in
     bt_estimates_print(in, NAN, "", true);
 }
 
+/// Ice drifts with wind and water as it does at the start, where neither changes; else with the water.
+static void order_speeds(const bt_case *c, bt_estimate_input *in)
+{
+    bt_estimate_input ordered;
+    double ice[2], body[2];
+    if (bt_environment_changes(c)) return;
+    bt_setup_drift(c, 2 * in->floe_radius, in->thickness, ice, body);
+    bt_estimate_ordered(c, ice, &ordered);
+    in->speed = ordered.speed;
+    in->along = in->ordered = ordered.along;
+}
+
 int bt_cmd_estimate(int argc, char **argv)
 {
     options o = {0};
@@ -76,6 +90,7 @@ int bt_cmd_estimate(int argc, char **argv)
             in.concentration = f.concentration;
             bt_estimate_field(&f, &in.thickness, &in.floe_radius);
         }
+        order_speeds(&c, &in);
         if (o.json) {
             bt_json j = {0};
             bt_json_open(&j, NULL, '{');

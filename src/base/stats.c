@@ -162,14 +162,21 @@ int64_t bt_stats_start_step(int64_t n)
     return step;
 }
 
+int64_t bt_stats_last_start(int64_t n, int64_t first)
+{
+    const int64_t step = bt_stats_start_step(n - first);
+    return first + (n - first) / 2 / step * step;
+}
+
 // MSER(d) = Σ_{j>=d} (Y_j − mean_d)² / (k − d)² over k batch means Y_j: the squared standard error that the batches
 // from d on would have if they were independent. Backwards recursion (Welford) over d, so one pass. The minimum is
-// searched in the first half of the series only: near the end few batches agree by chance.
+// searched in the first half of what follows `first` only: near the end few batches agree by chance.
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first)
 {
     if (first < 0) first = 0;
     if (first >= n) return first;
     const int64_t k = (n - first) / BATCH, step = bt_stats_start_step(n - first);
+    const int64_t last = bt_stats_last_start(n, first);
     double mean = 0, squares = 0, best = INFINITY;
     int64_t start = first;
     for (int64_t j = k - 1; j >= 0; j--) {
@@ -179,7 +186,7 @@ int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first)
         mean += delta / count;
         squares += delta * (y - mean);
         const int64_t at = first + BATCH * j;
-        if ((at > n / 2 && j > 0) || (at - first) % step) continue;
+        if ((at > last && j > 0) || (at - first) % step) continue;
         const double mser = squares / (count * count);
         if (mser <= best) {
             best = mser;

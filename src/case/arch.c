@@ -17,30 +17,64 @@ static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, 
 /// Ice as made misses the concentration asked for in the last digits, and what is printed as 90 % has the rule of 90 %.
 static bool reaches(double concentration, double limit) { return concentration >= limit - 0.005; }
 
-bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
+/// A pair of boundaries of the domain that may stand beside a tow, what lies between them, and its key.
+typedef struct pair {
+    bt_bound kind;
+    double extent;     ///< m
+    const char *key, *open;
+} pair;
+
+/// Body widths, and those that are needed, between one pair for a tow in the direction `course`.
+static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double concentration, double floe_size)
 {
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
-    // The tow goes along the domain, more or less: what stands at the sides is across it.
-    const double ahead = c->tow.direction - c->body.yaw,
-                 across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
-    const bool open = c->domain.sides == BT_BOUND_OPEN;
-    bt_arch a = {.concentration = concentration,
-                 .bodies = c->domain.width / across,
-                 .floes = floe_size > 0 ? c->domain.width / floe_size : NAN};
-    a.sides = open ? "open sides" : c->domain.sides == BT_BOUND_PERIODIC ? "periodic images" : "walls";
-    const bool beside = n > 0 && floe_size > 0; // ice beside a body
-    a.needed = NAN;
-    for (size_t k = 0; beside && !open && k < sizeof asked / sizeof *asked; k++)
+    const double ahead = course - c->body.yaw, across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
+    const bool open = p->kind == BT_BOUND_OPEN;
+    bt_arch a = {.key = p->key,
+                 .concentration = concentration,
+                 .bodies = p->extent / across,
+                 .floes = floe_size > 0 ? p->extent / floe_size : NAN,
+                 .needed = NAN};
+    a.sides = open ? p->open : p->kind == BT_BOUND_WALL ? "walls" : "periodic images";
+    a.beside = n > 0 && floe_size > 0;
+    for (size_t k = 0; a.beside && !open && k < sizeof asked / sizeof *asked; k++)
         if (reaches(concentration, asked[k].concentration)) a.needed = asked[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
     for (size_t k = 0; k < sizeof locked / sizeof *locked; k++)
         if (a.needed > 0 && way > 0 && reaches(concentration, locked[k].concentration))
             a.needed = bt_max(a.needed, ceil(2 * sqrt(way / (BT_PI * locked[k].slack * across))));
     a.possible = a.bodies < a.needed;
-    a.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
-    a.unbounded = a.rigid && beside && reaches(concentration, BT_BOUND_CONCENTRATION);
     return a;
+}
+
+/// Is a the narrower domain for its ice? Of two that nothing is asked of, the one with fewer body widths.
+static bool narrower(const bt_arch *a, const bt_arch *b)
+{
+    if (a->needed > 0 && b->needed > 0) return a->bodies / a->needed < b->bodies / b->needed;
+    if (a->needed > 0 || b->needed > 0) return a->needed > 0;
+    return a->bodies < b->bodies;
+}
+
+bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
+{
+    // along x: beside a tow along y
+    const pair pairs[2] = {{c->domain.sides, c->domain.width, "domain.width", "open sides"},
+                           {c->domain.ends, c->domain.length, "domain.length", "open ends"}};
+    const int legs = c->tow.n_waypoints > 0 ? c->tow.n_waypoints : 1;
+    bt_arch worst = {.key = NULL};
+    for (int leg = 0; leg < legs; leg++) {
+        const double *q = c->tow.waypoints + 2 * leg;
+        const double course = leg == 0 ? c->tow.direction : bt_atan2(q[1] - q[-1], q[0] - q[-2]);
+        for (int k = 0; k < 2; k++) {
+            if (fabs(k ? bt_cos(course) : bt_sin(course)) >= BT_ARCH_ALONG) continue; // that pair is ahead and astern
+            const bt_arch a = beside_tow(c, &pairs[k], course, concentration, floe_size);
+            if (!worst.key || narrower(&a, &worst)) worst = a;
+        }
+    }
+    worst.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
+    worst.unbounded = worst.rigid && worst.beside && reaches(concentration, BT_BOUND_CONCENTRATION);
+    return worst;
 }
 
 const char *bt_arch_floes(const bt_arch *a) { return a->rigid ? "rigid floes" : "floes"; }
@@ -49,10 +83,10 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
 {
     if (a->possible)
         bt_errors_add(warnings,
-                      "domain.width: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
+                      "%s: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
-                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->needed);
+                      a->key, a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->needed);
     if (a->unbounded)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "

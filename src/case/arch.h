@@ -25,16 +25,23 @@
 
 #define BT_BOUND_CONCENTRATION 0.75 ///< from which on rigid ice is said to have no upper bound of load, assumed
 
+/// Least cosine between a tow and an axis of the domain along which it is taken to go: the boundaries at the ends of
+/// that axis lie ahead and astern, and the others beside it. On an oblique course all four are beside it, and the pair
+/// that is narrower for its ice counts; of way-points, the leg for which that is.
+#define BT_ARCH_ALONG 0.9
+
 typedef struct bt_arch {
+    const char *key;      ///< "domain.width", or "domain.length" where the tow goes along y
     double concentration; ///< as given
-    double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
+    double bodies;        ///< that extent in widths of the body across the tow; NaN without a body
     double floes;         ///< the same in mean floe sizes; NaN without floes
     double needed;        ///< body widths of a domain that is not expected to show; NaN where nothing holds the ice at
                           ///< the sides, or it is too loose to matter
+    bool beside;          ///< there is a body, and ice beside it
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush
     bool unbounded;       ///< rigid and dense, around a towed body: no upper bound of its load
-    const char *sides;    ///< "walls", "periodic images" or "open sides"
+    const char *sides;    ///< "walls", "periodic images", "open sides" or "open ends"
 } bt_arch;
 
 /// concentration, and mean floe size in m (0 without floes): as made, or as the case asks for.

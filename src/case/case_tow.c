@@ -142,20 +142,38 @@ double bt_case_line_period(const bt_case *c)
     return isfinite(period) ? period : 0;
 }
 
+/// Time that the tow takes to its speed at its steepest rise, s: the ramp; of a programme that of a ramp as steep. A
+/// programme that begins with a speed begins with a jerk: 0.
+static double steepest_ramp(const bt_case *c)
+{
+    const double *p = c->tow.programme;
+    if (c->tow.n_programme == 0) return c->tow.ramp;
+    double least = p[1] > 0 ? 0 : INFINITY;
+    for (int i = 0; i + 1 < c->tow.n_programme; i++)
+        if (p[2 * i + 3] > p[2 * i + 1])
+            least = bt_min(least, (p[2 * i + 2] - p[2 * i]) * c->tow.speed / (p[2 * i + 3] - p[2 * i + 1]));
+    return least;
+}
+
 bool bt_case_start_is_slow(const bt_case *c)
 {
-    return c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
+    return steepest_ramp(c) >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
 }
 
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
     if (bt_case_start_is_slow(c)) return;
-    const double period = bt_case_line_period(c);
-    bt_errors_add(warnings,
-                  "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the line, "
-                  "and it swings on; leave "
-                  "tow.ramp out, or take at least %.3g s",
-                  c->tow.ramp, period, BT_RAMP_PERIODS * period);
+    const double period = bt_case_line_period(c), ramp = steepest_ramp(c);
+    if (c->tow.n_programme > 0)
+        bt_errors_add(warnings,
+                      "tow.programme: a rise as steep as from 0 to %.4g m/s in %.4g s is short for a body that swings "
+                      "on its line in %.3g s: it jerks the line, which swings on; take at least %.3g s for that",
+                      c->tow.speed, ramp, period, BT_RAMP_PERIODS * period);
+    else
+        bt_errors_add(warnings,
+                      "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the "
+                      "line, and it swings on; leave tow.ramp out, or take at least %.3g s",
+                      ramp, period, BT_RAMP_PERIODS * period);
 }
 
 void bt_case_tow_ramp(bt_case *c)

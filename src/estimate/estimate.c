@@ -91,7 +91,7 @@ static bt_estimate ships(const bt_estimate_input *in)
 
 static bt_estimate open_water(const bt_estimate_input *in)
 {
-    return just(in->drag * in->speed * in->along, true, "drag of the water alone");
+    return just(in->drag * in->water_speed * in->water_along, true, "drag of the water alone");
 }
 
 /// Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9.
@@ -201,6 +201,11 @@ static double weighted_size(const bt_case *c)
 
 void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
 {
+    bt_estimate_ordered(c, (const double[]){NAN, NAN}, in);
+}
+
+void bt_estimate_ordered(const bt_case *c, const double ice[2], bt_estimate_input *in)
+{
     const double scale = c->estimate.length_scale;
     *in = (bt_estimate_input){
         .concentration = c->ice.concentration,
@@ -208,6 +213,9 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
         .floe_radius = 0.5 * weighted_size(c),
         .speed = NAN,
         .along = NAN,
+        .water_speed = NAN,
+        .water_along = NAN,
+        .ordered = NAN,
         .restitution = c->body.restitution,
         .ship = c->body.shape == BT_BODY_SHIP,
         .ice_density = c->ice.density,
@@ -230,10 +238,14 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
     if (c->tow.mode == BT_TOW_NONE) return;
     double current[2]; // of a current that changes the mean over the run
     bt_environment_mean(c, true, current);
-    const double rx = c->tow.speed * ux - current[0], ry = c->tow.speed * uy - current[1];
-    in->speed = bt_hypot(rx, ry);
-    in->along = rx * ux + ry * uy;
-    const double flow = in->speed > 0 ? bt_atan2(ry, rx) - c->body.yaw : ahead;
+    const double *drift = isnan(ice[0]) ? current : ice;
+    const double rx = c->tow.speed * ux - current[0], ry = c->tow.speed * uy - current[1],
+                 ix = c->tow.speed * ux - drift[0], iy = c->tow.speed * uy - drift[1];
+    in->speed = bt_hypot(ix, iy);
+    in->along = in->ordered = ix * ux + iy * uy;
+    in->water_speed = bt_hypot(rx, ry);
+    in->water_along = rx * ux + ry * uy;
+    const double flow = in->water_speed > 0 ? bt_atan2(ry, rx) - c->body.yaw : ahead;
     in->drag =
         0.5 * c->water.density * c->body.drag.water_form * c->body.draft *
             bt_shape_width(n, v, bt_cos(flow), bt_sin(flow)) +

@@ -74,6 +74,12 @@ void bt_environment_mean(const bt_case *c, bool water, double v[2])
     v[0] = sum[0] / SAMPLES, v[1] = sum[1] / SAMPLES;
 }
 
+bool bt_environment_changes(const bt_case *c)
+{
+    const flow water = flow_of(c, true), air = flow_of(c, false);
+    return changes(&water) || changes(&air);
+}
+
 static void own(bt_table *t)
 {
     if (t->n == 0) return;

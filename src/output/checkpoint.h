@@ -40,7 +40,9 @@
 //                     D, - the rest
 //   bt_forces         D own
 //                     - what is recorded of the towed body, its place
-//   bt_window         S start, rear, drift, vel, counters, dropped, brought
+//   bt_undisturbed    S drift, vel
+//                     D the rest
+//   bt_window         S start, rear, counters, dropped, brought
 //                     D the rest
 //   bt_environment    D (tables from the checkpoint)
 //   bt_world          S step, drift, events

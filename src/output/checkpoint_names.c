@@ -29,8 +29,8 @@ static const row rows[] = {
     {"case/wind", "s, m/s, m/s", "table of the wind: time, x, y", "wind_row time_x_y"},
     // the world
     {"world/step", "1", "steps done", "one"},
-    {"world/drift_x", "m", "way that the undisturbed ice has drifted, x", "one"},
-    {"world/drift_y", "m", "way that the undisturbed ice has drifted, y", "one"},
+    {"world/drift_x", "m", "way that the water has gone, x", "one"},
+    {"world/drift_y", "m", "way that the water has gone, y", "one"},
     {"world/hash", "1", "hash of the state", "one"},
     {"step/dt", "s", "time step", "one"},
     {"step/x0", "m", "low corner of the domain, x", "one"},
@@ -111,6 +111,8 @@ static const row rows[] = {
     {"stall/spent", "s", "time spent in it", "one"},
     {"stall/from_x", "m", "where the body was at its beginning, x", "one"},
     {"stall/from_y", "m", "where the body was at its beginning, y", "one"},
+    {"stall/ice", "N s", "impulse of the ice against the tow in it", "one"},
+    {"stall/pull", "N s", "impulse of the tow in it", "one"},
     {"stall/begun", "1", "1 = such a window is under way", "one"},
     {"lead/mode", "1", "kind of the lead ahead of the body", "one"},
     {"lead/width", "m", "its width", "one"},
@@ -121,6 +123,11 @@ static const row rows[] = {
     {"lead/mean_piece", "m", "their mean size", "one"},
     {"lead/concentration_before", "1", "concentration of the ice before the lead was made", "one"},
     {"lead/concentration_after", "1", "concentration of the ice after it", "one"},
+    // undisturbed ice; with a moving window under that name
+    {"undisturbed/drift_x", "m", "way of the undisturbed ice, x", "one"},
+    {"undisturbed/drift_y", "m", "way of the undisturbed ice, y", "one"},
+    {"undisturbed/vel", "m/s, m/s, rad/s, 1", "velocity of the undisturbed ice, x, y, turning; the last is unused",
+     "one motion"},
     // the moving window
     {"window/start", "m", "place of the rear end at first, along the tow", "one"},
     {"window/rear", "m", "place of the rear end now, along the tow", "one"},

@@ -34,6 +34,10 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_RESIDUAL, "residual", residual),
     COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
     COLUMN(BT_COL_QUASI_STATIC, "push", largest_push),
+    COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice),
+    COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice),
+    COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water),
+    COLUMN(BT_COL_LEEWAY_WATER, "leeway_through_water", leeway_through_water),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)

@@ -155,6 +155,14 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->body_vx = b->vel[t].x;
     s->body_vy = b->vel[t].y;
     s->body_yaw_rate = b->vel[t].w;
+    const double water_x = w->par.water_u, water_y = w->par.water_v;
+    const bt_vel drift = w->undisturbed ? w->undisturbed->vel : (bt_vel){.x = water_x, .y = water_y};
+    const double through_ice[2] = {b->vel[t].x - drift.x, b->vel[t].y - drift.y},
+                 through_water[2] = {b->vel[t].x - water_x, b->vel[t].y - water_y};
+    s->speed_through_ice = through_ice[0] * dx + through_ice[1] * dy;
+    s->leeway_through_ice = through_ice[1] * dx - through_ice[0] * dy;
+    s->speed_through_water = through_water[0] * dx + through_water[1] * dy;
+    s->leeway_through_water = through_water[1] * dx - through_water[0] * dy;
     if (bt_tow_has_line(tow)) {
         observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {

@@ -32,6 +32,9 @@ typedef struct bt_sample {
     double ice_resistance_budget; ///< N, the same resistance by momentum, without the contacts of the body (observe.c)
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
+    /// m/s of the body relative to undisturbed ice (step/undisturbed.h) and to the water: along the tow direction, and
+    /// to its left
+    double speed_through_ice, leeway_through_ice, speed_through_water, leeway_through_water;
     /// N (the larger of two branches), m (the first), m, m (NaN without a line)
     double line_tension, line_length, carriage_x, carriage_y;
     double line_tension_1, line_tension_2; ///< N by branch; NaN without it
@@ -160,6 +163,7 @@ typedef struct bt_run_totals {
     bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
     const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
+    const struct bt_undisturbed *undisturbed; ///< ice, at the end of the run; NULL where no body is towed
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;

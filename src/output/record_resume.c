@@ -118,8 +118,10 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < h->n_columns; k++) {
         free(h->column[k]);
-        if (k >= BT_N_COLUMNS && !bt_snapshot_find(s, bt_history_name(k, name))) {
+        const bool later = k >= BT_COL_SPEED_ICE; // came after the first checkpoints
+        if (later && !bt_snapshot_find(s, bt_history_name(k, name))) {
             h->column[k] = bt_alloc((size_t)n, sizeof *h->column[k]);
+            for (int64_t i = 0; k < BT_N_COLUMNS && i < n; i++) h->column[k][i] = NAN;
             continue;
         }
         h->column[k] = bt_snapshot_copy(s, bt_history_name(k, name), BT_ITEM_F64, 1, &n);

@@ -71,10 +71,15 @@ static const bt_state_row tow_rows[] = {
 
 #define WINDOW(type, width, member) MEMBER(bt_window, #member, type, width, member)
 static const bt_state_row window_rows[] = {
-    WINDOW(F64, 1, start),   WINDOW(F64, 1, rear),        WINDOW(F64, 1, drift_x), WINDOW(F64, 1, drift_y),
-    WINDOW(F64, 4, vel),     WINDOW(I64, 1, renewed),     WINDOW(I64, 1, kept),    WINDOW(I64, 1, missed),
-    WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
+    WINDOW(F64, 1, start),   WINDOW(F64, 1, rear),        WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),
+    WINDOW(I64, 1, missed),  WINDOW(I64, 1, waiting),     WINDOW(I64, 1, renewed_now),
+    WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
 };
+
+/// Under the name of the window where there is one, as in checkpoints of before the ice was followed without it.
+#define UNDISTURBED(width, member) MEMBER(bt_undisturbed, #member, F64, width, member)
+static const bt_state_row undisturbed_rows[] = {UNDISTURBED(1, drift_x), UNDISTURBED(1, drift_y), UNDISTURBED(4, vel)};
+static const char *undisturbed_of(const bt_world *w) { return w->window ? "window" : "undisturbed"; }
 
 enum {
     IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double),
@@ -85,6 +90,8 @@ enum {
 #define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
 static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time),   STALL(F64, asked), STALL(F64, spent),
                                           STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun)};
+/// Not in checkpoints of before, which have 0 for the window under way.
+static const bt_state_row held_rows[] = {STALL(F64, ice), STALL(F64, pull)};
 
 #define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
 static const bt_state_row lead_rows[] = {
@@ -129,10 +136,12 @@ _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
+    bt_snapshot_add_rows(s, "stall", held_rows, N_OF(held_rows), t);
 }
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
+    if (bt_snapshot_find(s, "stall/ice")) bt_snapshot_take_rows(s, "stall", held_rows, N_OF(held_rows), t);
 }
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
 {
@@ -438,6 +447,8 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->undisturbed)
+        bt_snapshot_add_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
     save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event,
                  w->events.n);
@@ -472,6 +483,8 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
     if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
     if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
+    if (!found)
+        found = rows_not_finite(undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed, name);
     const bt_impacts *m = w->impacts;
     if (found || !m) return found;
     if (!bt_state_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
@@ -505,6 +518,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    // A checkpoint of before it was followed without a window: from here on, as it began.
+    if (w->undisturbed && (w->window || bt_snapshot_find(s, "undisturbed/vel")))
+        bt_snapshot_take_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts && c->rank == 0) {
         free(w->impacts->open);
         w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);

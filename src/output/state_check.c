@@ -223,18 +223,29 @@ static void check_tow(const bt_world *w, bt_snapshot *s)
 static void check_window(const bt_world *w, bt_snapshot *s)
 {
     const bt_window *v = w->window;
-    const double real[] = {v->start, v->rear, v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
+    const double real[] = {v->start, v->rear};
     bt_snapshot_want(
         s,
         bt_state_finite(real, sizeof real / sizeof *real) && bt_state_finite(v->dropped, 3) &&
             bt_state_finite(v->brought, 3),
         "window/rear", -1, "and what else belongs to it are not all finite");
-    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
-    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
-                     "is out of range");
     bt_snapshot_want(
         s, counts(v->renewed) && counts(v->kept) && counts(v->missed) && counts(v->waiting) && counts(v->renewed_now),
         "window/renewed", -1, "and its other counters are not all counts");
+}
+
+/// Places of floes that enter a window are found from the drift.
+static void check_undisturbed(const bt_world *w, bt_snapshot *s)
+{
+    const bt_undisturbed *v = w->undisturbed;
+    const double real[] = {v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
+    bt_snapshot_want(s, bt_state_finite(real, sizeof real / sizeof *real),
+                     w->window ? "window/drift_x" : "undisturbed/drift_x", -1,
+                     "and what else belongs to undisturbed ice are not all finite");
+    if (!w->window) return;
+    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
+    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
+                     "is out of range");
 }
 
 static bool is_gid(double x, bt_gid n) { return x >= 0 && x < (double)n && x == floor(x); }
@@ -282,6 +293,7 @@ void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool 
     if (!s->faulty) check_contacts(w, memory, n, s);
     if (w->tow && !s->faulty) check_tow(w, s);
     if (w->window && !s->faulty) check_window(w, s);
+    if (w->undisturbed && !s->faulty) check_undisturbed(w, s);
     if (impacts && !s->faulty) check_impacts(w, s);
     check_events(w, s);
 }

@@ -69,13 +69,13 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
         const int64_t start = bt_stats_steady_start(x, h->n, earliest);
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
-        if (start > earliest && start + 5 > h->n / 2)
-            settles = reported[k].name;
+        if (start > earliest && start == bt_stats_last_start(h->n, earliest)) settles = reported[k].name;
     }
     if (settles)
         decide(
             s, BT_NOT_STEADY,
-            "the %s still settles in the first half of the run, and the window begins at its middle (%g s): run longer",
+            "the %s still settles where the search for a start ends, halfway from the end of the ramp to that of the "
+            "run, and the window begins there (%g s): run longer",
             settles, h->column[BT_COL_TIME][first]);
     return first;
 }
@@ -159,7 +159,8 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     }
     if (t->stall.time > BT_STEADY_STALLED * s->end)
         decide(s, BT_NOT_STEADY,
-               "the towed body stood still for %.3g s of %.3g s: the mean depends on how often it jammed",
+               "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
+               "jams",
                t->stall.time, s->end);
     if (!t->window) return;
     const double places = (double)(t->window->renewed + t->window->missed);
@@ -187,6 +188,16 @@ static void judge_trends(bt_steady *s)
                bt_force_text(high, bt_max(fabs(t->low), fabs(t->high))), 100 * fabs(t->change / r->mean.mean));
         return;
     }
+}
+
+/// A body that no floe has touched tells nothing of the ice, however long the window.
+static void judge_contact(bt_steady *s, const bt_history *h, const bt_run_totals *t)
+{
+    s->met_no_ice = t->concentration > 0;
+    for (int64_t i = s->first; i < h->n && s->met_no_ice; i++) s->met_no_ice = h->column[BT_COL_ICE][i] == 0;
+    if (s->met_no_ice)
+        decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
+               s->start, s->end, 100 * t->concentration);
 }
 
 /// The load that is known worst.
@@ -232,5 +243,6 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     judge_solver(s, c, t);
     judge_events(s, c, t);
     judge_trends(s);
+    judge_contact(s, h, t);
     judge_length(s);
 }

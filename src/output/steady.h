@@ -5,7 +5,7 @@
 //     0    earliest     start                                             end
 //
 // Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that
-// MSER-5 finds, and of these the
+// MSER-5 finds, halfway to the end of the run at the latest, and of these the
 // latest: the ice resistance may be steady long before the tension of the line is.
 // Verdict:
 //     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within
@@ -61,6 +61,7 @@ typedef struct bt_steady {
     double correlation_time;      ///< of the ice resistance, s
     double unconverged;           ///< share of the steps in the window that did not converge
     double residual;              ///< largest of them, m/s
+    bool met_no_ice;              ///< there is ice, and none has touched the body within the window
     bool given;                   ///< by output.window_start, not found
     int64_t first, n;             ///< steps
     int64_t put_off;              ///< steps from the earliest possible start to the first

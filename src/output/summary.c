@@ -11,6 +11,7 @@
 #include "case/case_check.h"
 #include "estimate/packing.h"
 #include "output/summary_window.h"
+#include "base/elementary.h"
 #include "solve/locked.h"
 
 #include <math.h>
@@ -185,7 +186,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
         bt_errors_add(
             &s->warnings,
             "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a "
-            "path of a mean floe size: a jam%s",
+            "path of a mean floe size, and the ice held it: a jam%s",
             t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
             c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0
                 ? ""
@@ -196,12 +197,28 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
     warn_of_events(s, t->events);
-    bt_summary_window_warn(&s->warnings, t->window);
+    bt_summary_window_warn(&s->warnings, t->window, t->undisturbed);
     if (t->floes_outside)
         bt_errors_add(&s->warnings,
                       "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
                       "matters",
                       (long long)t->floes_outside);
+}
+
+/// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift.
+static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_totals *t)
+{
+    bt_estimate_input *in = &s->estimate;
+    const double ice[2] = {mean_over(s, h, BT_COL_SPEED_ICE).mean, mean_over(s, h, BT_COL_LEEWAY_ICE).mean},
+                 water[2] = {mean_over(s, h, BT_COL_SPEED_WATER).mean, mean_over(s, h, BT_COL_LEEWAY_WATER).mean};
+    bool adrift = false;
+    for (int64_t i = 0; t->events && i < t->events->n; i++) adrift |= t->events->event[i].kind == BT_EVENT_ADRIFT;
+    if (adrift) {
+        in->speed = in->along = in->water_speed = in->water_along = NAN;
+    } else if (isfinite(ice[0]) && !isnan(in->along)) {
+        in->along = ice[0], in->speed = bt_hypot(ice[0], ice[1]);
+        in->water_along = water[0], in->water_speed = bt_hypot(water[0], water[1]);
+    }
 }
 
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
@@ -222,6 +239,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         bt_estimate_conditions(c, &s->estimate);
+        measure_speeds(s, h, t);
         s->estimate.concentration = t->concentration;
         if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
         if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;
@@ -239,6 +257,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     warn_of_solver(s, h, c, t);
     warn_of_bodies(s, h, c, t);
 }
+
+double bt_summary_held_against(const bt_summary *s) { return s->window.met_no_ice ? NAN : s->ice.mean; }
 
 void bt_summary_free(bt_summary *s)
 {

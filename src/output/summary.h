@@ -38,6 +38,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
                       bt_idx n_floes);
 void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
                       bt_idx n_floes);
+/// Mean ice resistance that estimates are held against, N; NaN where the body met no ice in the window.
+double bt_summary_held_against(const bt_summary *s);
 void bt_summary_free(bt_summary *s);
 
 #endif

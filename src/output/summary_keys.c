@@ -15,7 +15,7 @@
 
 typedef bt_summary_view view;
 
-enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_IMPACTS, N_FROM };
+enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_UNDISTURBED, FROM_IMPACTS, N_FROM };
 
 // --- what is no member of a struct -----------------------------------------------------------------------------------
 
@@ -125,7 +125,7 @@ static void write_exceedance(bt_json *j, const char *key, const view *v, const v
 static void write_estimates(bt_json *j, const char *key, const view *v, const void *source)
 {
     (void)source;
-    if (v->s->body) bt_estimates_json(j, key, &v->s->estimate, v->s->ice.mean);
+    if (v->s->body) bt_estimates_json(j, key, &v->s->estimate, bt_summary_held_against(v->s));
     else bt_json_string(j, key, NULL);
 }
 
@@ -173,6 +173,7 @@ static void write_warnings(bt_json *j, const char *key, const view *v, const voi
 #define OF_TOTALS(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__)}
 #define OF_CASE(...) {BT_JSON_AT(FROM_CASE, bt_case, __VA_ARGS__)}
 #define OF_WINDOW(...) {BT_JSON_AT(FROM_WINDOW, bt_window, __VA_ARGS__)}
+#define OF_UNDISTURBED(...) {BT_JSON_AT(FROM_UNDISTURBED, bt_undisturbed, __VA_ARGS__)}
 #define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
 #define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
 #define PHASE(name, text) MACHINE("phases_s." #name, phases.name, "s", "wall time of " text),
@@ -218,7 +219,8 @@ static const bt_json_key rows[] = {
     OF_TOTALS("concentration", concentration, "1", "ice concentration as made"),
     OF_TOTALS("mean_size_m", mean_size, "m", "mean equivalent diameter of the floes"),
     GROUP("domain", has_body, "whether the forces are a property of the domain"),
-    OF_SUMMARY("domain.body_widths", arch.bodies, "1", "width of the domain in widths of the body across the tow"),
+    OF_SUMMARY("domain.across", arch.key, "", "key of the extent of the domain across the tow"),
+    OF_SUMMARY("domain.body_widths", arch.bodies, "1", "that extent in widths of the body across the tow"),
     OF_SUMMARY("domain.body_widths_needed", arch.needed, "1",
         "of a domain whose width is not expected to show (assumed), where walls or periodic images hold dense ice"),
     OF_SUMMARY("domain.load_unbounded", arch.unbounded, "1",
@@ -378,8 +380,8 @@ static const bt_json_key rows[] = {
     OF_WINDOW("moving_window.waiting", waiting, "1", "floes behind it whose place ahead is not free"),
     OF_WINDOW("moving_window.kept", kept, "1", "floes that went round as they were"),
     OF_WINDOW("moving_window.missed", missed, "1", "places ahead that stayed empty"),
-    OF_WINDOW("moving_window.ice_drift_x_m", drift_x, "m", "way of undisturbed ice, x"),
-    OF_WINDOW("moving_window.ice_drift_y_m", drift_y, "m", "way of undisturbed ice, y"),
+    OF_UNDISTURBED("moving_window.ice_drift_x_m", drift_x, "m", "way of undisturbed ice, x"),
+    OF_UNDISTURBED("moving_window.ice_drift_y_m", drift_y, "m", "way of undisturbed ice, y"),
     OF_WINDOW("moving_window.dropped_momentum_x_n_s", dropped[0], "N s",
         "momentum of the renewed floes as they were taken out, x"),
     OF_WINDOW("moving_window.dropped_momentum_y_n_s", dropped[1], "N s",
@@ -445,7 +447,7 @@ const int bt_n_reported_keys = sizeof bt_reported_keys / sizeof *bt_reported_key
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n)
 {
     const view v = {s, h, c, t, n};
-    const void *const source[N_FROM] = {s, h, t, c, t->window, s->impacts};
+    const void *const source[N_FROM] = {s, h, t, c, t->window, t->undisturbed, s->impacts};
     bt_json j = {0};
     bt_json_open(&j, NULL, '{');
     int n_keys;

@@ -128,10 +128,11 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (s->body) print_forces(s, c);
     bt_impacts_print(s->impacts);
     if (s->body && !isnan(s->estimate.along)) {
-        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate where "
-               "that knows the concentration and holds, regime\n",
-               s->estimate.along);
-        bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
+        const bt_estimate_input *in = &s->estimate;
+        printf("  estimates           at %.4g m/s through the ice", in->along);
+        if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
+        printf(": force, ice resistance of this run / estimate where that knows the concentration and holds, regime\n");
+        bt_estimates_print(in, bt_summary_held_against(s), "    ", false);
     }
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts,

@@ -154,7 +154,7 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
                      "is no number of steps");
     bt_snapshot_want(s,
                      t->windows >= 0 && t->windows <= BT_MOST_STEPS &&
-                         isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y),
+                         isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y + t->ice + t->pull),
                      "stall/windows", -1, "and what else tells whether the body stood still are no counts and numbers");
     bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "are not all finite");
     bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");

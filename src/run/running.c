@@ -285,7 +285,7 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
     bt_sample *const s = &r->sample;
     bt_observe(w, r->reference_speed, s);
-    bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
+    bt_stall_step(&r->totals.stall, w, s->ice_resistance, s->tow_force, r->roster.mean_size);
     const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, s, err);
     // what is not has been reported, and the series hold numbers only
     const bool writable = !bt_sample_fault(s, bt_observe_applies(w));
@@ -366,6 +366,7 @@ static void total_up(run *r)
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
     r->totals.window = r->w->window;
+    r->totals.undisturbed = r->w->undisturbed;
     note_division(r);
 }
 

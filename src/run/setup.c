@@ -436,8 +436,10 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
+    const bool held[2] = {c->domain.ends == BT_BOUND_WALL, c->domain.sides == BT_BOUND_WALL};
+    if (with_body) bt_undisturbed_create(w, r->n_floes, held);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
-        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes, c->domain.sides == BT_BOUND_WALL);
+        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     *out = w;
     if (!drifts) return BT_ERR_CASE;
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);

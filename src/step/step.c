@@ -267,7 +267,7 @@ void bt_world_step(bt_world *w)
     bt_forces_record(w); // of the towed body, at X1
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
-    bt_window_advance(w);
+    bt_undisturbed_advance(w);
     bt_domain_note(w);
     w->step++;
 #ifdef BT_VALIDATE

@@ -32,49 +32,16 @@ typedef struct candidate {
     bool stays;
 } candidate;
 
-/// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
-/// no direction has a width of its own. Mean width of a convex outline: perimeter / π (Cauchy).
-static void mean_floe(const bt_world *w, bt_window *v)
-{
-    const bt_bodies *b = &w->bodies;
-    double n = 0;
-    for (bt_gid g = 0; g < v->n_floes; g++) {
-        const bt_idx i = bt_world_index(w, g);
-        if (b->motion[i] != BT_DYNAMIC) continue;
-        double perimeter = 0;
-        for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
-        v->mass += b->mass[i];
-        v->share += b->share[i] * b->mass[i];
-        v->inertia += b->inertia[i];
-        v->radius += b->radius[i];
-        v->area += b->area[i];
-        v->thickness += b->thickness[i];
-        v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
-        v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
-        // relative to the water, so that the mean of floes that rest in it does to the last bit
-        v->vel.x += b->vel[i].x - w->par.water_u;
-        v->vel.y += b->vel[i].y - w->par.water_v;
-        n++;
-    }
-    if (n == 0) return;
-    v->share /= v->mass;
-    v->mass /= n, v->drag.water_skin /= n, v->drag.air_skin /= n;
-    v->inertia /= n, v->radius /= n, v->area /= n, v->thickness /= n;
-    v->vel.x = w->par.water_u + v->vel.x / n, v->vel.y = w->par.water_v + v->vel.y / n;
-}
-
 static double body_at(const bt_world *w) { return w->window->sign * w->tow->travel_x; }
 
-void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes, bool held)
+void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
 {
     bt_bodies *b = &w->bodies;
     const double length = w->par.period_x, zone = ZONE_SHARE * ahead;
     bt_window *v = w->window = bt_alloc(1, sizeof *v);
-    *v = (bt_window){.sign = sign, .length = length, .ahead = ahead, .zone = zone, .n_floes = n_floes, .held = held};
+    *v = (bt_window){.sign = sign, .length = length, .ahead = ahead, .zone = zone, .n_floes = n_floes};
     v->stride = bt_min(STRIDE_SIZES * w->par.size, bt_min(0.25 * zone, length / 16));
     v->start = v->rear = body_at(w) + ahead - length;
-    mean_floe(w, v);
-    if (held) v->vel.y = 0;
     for (bt_idx i = 0; i < b->n; i++) {
         const double x = b->pose[i].x;
         bt_home *h = &b->home[i];
@@ -94,7 +61,7 @@ static bool renewable(const bt_world *w, bt_idx i)
 static double home_at(const bt_world *w, bt_idx i)
 {
     const bt_home *h = &w->bodies.home[i];
-    return w->window->sign * (h->x + w->window->drift_x + h->copy * w->window->length);
+    return w->window->sign * (h->x + w->undisturbed->drift_x + h->copy * w->window->length);
 }
 static double floe_at(const bt_world *w, bt_idx i)
 {
@@ -128,8 +95,8 @@ static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
     const bt_home *h = &w->bodies.home[i];
     int32_t across;
     bt_pose p = {.yaw = h->yaw, .c = bt_cos(h->yaw), .s = bt_sin(h->yaw)};
-    p.x = into(h->x + v->drift_x, w->par.x0, v->length, turns);
-    p.y = into(h->y + v->drift_y, w->par.y0, w->par.period_y, &across);
+    p.x = into(h->x + w->undisturbed->drift_x, w->par.x0, v->length, turns);
+    p.y = into(h->y + w->undisturbed->drift_y, w->par.y0, w->par.period_y, &across);
     return p;
 }
 
@@ -291,15 +258,15 @@ static void put(bt_world *w, bt_idx i)
     b->pose[i] = place_of(w, i, &turns);
     h->copy += (int32_t)v->sign;
     h->lap = turns + h->copy;
-    b->vel[i] = b->vel_start[i] = b->vel_free[i] = v->vel;
+    b->vel[i] = b->vel_start[i] = b->vel_free[i] = w->undisturbed->vel;
     b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
 }
 
 /// Every rank adds in the order of ids, all floes, held here or not: the sums are the same everywhere.
-static void account(bt_window *v, const candidate *c)
+static void account(bt_window *v, const candidate *c, const bt_vel *enters)
 {
-    const bt_vel *states[2] = {&c->was, &v->vel};
+    const bt_vel *states[2] = {&c->was, enters};
     double *sums[2] = {v->dropped, v->brought};
     for (int k = 0; k < 2; k++) {
         const bt_vel *u = states[k];
@@ -317,7 +284,7 @@ static void renew(bt_world *w, const candidate *list, size_t n)
     uint8_t *moved = bt_alloc((size_t)w->bodies.n, 1);
     for (size_t k = 0; k < n; k++) {
         if (list[k].stays) continue;
-        account(v, &list[k]);
+        account(v, &list[k], &w->undisturbed->vel);
         const bt_idx i = bt_world_index(w, list[k].gid);
         if (i < 0) continue;
         moved[i] = 1;
@@ -377,29 +344,12 @@ void bt_window_begin(bt_world *w)
     let_go(w);
 }
 
-/// A step of the free drift of the mean floe by the table of force laws, as of every floe; so what has the velocity of
-/// the water keeps it to the last bit.
-void bt_window_advance(bt_world *w)
+uint64_t bt_window_hash(const bt_world *w)
 {
-    bt_window *v = w->window;
-    if (!v) return;
-    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
-    const bt_bodies one = {
-        .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
-    bt_force_body mean = {
-        .drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
-    bt_vel u = bt_forces_drift(w, &mean);
-    u.w = 0;
-    if (v->held) u.y = 0;
-    v->vel = u;
-    v->drift_x += w->par.dt * u.x;
-    v->drift_y += w->par.dt * u.y;
-}
-
-uint64_t bt_window_hash(const bt_window *v)
-{
-    const double state[] = {v->rear,  v->drift_x,         v->drift_y,      v->vel.x,
-                            v->vel.y, (double)v->renewed, (double)v->kept, (double)v->missed};
+    const bt_window *v = w->window;
+    const bt_undisturbed *ice = w->undisturbed;
+    const double state[] = {v->rear,    ice->drift_x,       ice->drift_y,    ice->vel.x,
+                            ice->vel.y, (double)v->renewed, (double)v->kept, (double)v->missed};
     uint64_t h = 0, u;
     for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
         memcpy(&u, &state[k], sizeof u);

@@ -21,12 +21,11 @@
 // twice the bodies be kept for a deficit that a longer window removes); a window with open ends (ice in front of a berg
 // at 80 % would give way).
 //
-// Undisturbed ice drifts as the mean floe of the field does without contacts, by the equations of forces.h; between
-// side walls only along x.
+// Undisturbed ice: step/undisturbed.h.
 #ifndef BERGTOW_WINDOW_H
 #define BERGTOW_WINDOW_H
 
-#include "bergtow/world.h"
+#include "step/undisturbed.h"
 
 typedef struct bt_window {
     // constants
@@ -35,14 +34,8 @@ typedef struct bt_window {
     double stride;        ///< the rear moves on by multiples of this, m
     double zone;          ///< depth of the front zone, m
     bt_gid n_floes;       ///< bodies below this id are renewed
-    bool held;            ///< walls at the sides: the mother field does not drift across
-    double mass, inertia, radius, area, thickness; ///< mean floe
-    bt_drag drag;         ///< its drag, that along the outline as part of the skin's
-    double share;         ///< m/M of all floes together
     // state
     double start, rear;   ///< σx of the rear end at first and now, m
-    double drift_x, drift_y; ///< way of undisturbed ice since the start, m
-    bt_vel vel;           ///< its velocity
     int64_t renewed, kept, missed; ///< in all
     int64_t waiting;      ///< floes behind the rear that were not renewed when it last moved
     int64_t renewed_now;  ///< in the last step
@@ -51,15 +44,12 @@ typedef struct bt_window {
 } bt_window;
 
 /// Let the window follow the towed body of a world whose bodies have all been added, before it is distributed to ranks:
-/// par.period_x is its length.
-/// sign: of the tow along x; ahead: m; n_floes: bodies below this id are renewed; held: walls at the sides.
-void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes, bool held);
+/// par.period_x is its length, and w->undisturbed is there.
+/// sign: of the tow along x; ahead: m; n_floes: bodies below this id are renewed.
+void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes);
 
 /// Collective. At the start of a step: the rear follows the body, floes are renewed. Nothing without a window.
 void bt_window_begin(bt_world *w);
-
-/// At the end of a step: undisturbed ice drifts on.
-void bt_window_advance(bt_world *w);
 
 /// Low end of the window, x in m.
 static inline double bt_window_low(const bt_window *v) { return v->sign > 0 ? v->rear : -(v->rear + v->length); }
@@ -67,6 +57,7 @@ static inline double bt_window_low(const bt_window *v) { return v->sign > 0 ? v-
 /// Windows that have gone by: way of the rear over the length.
 static inline double bt_window_laps(const bt_window *v) { return (v->rear - v->start) / v->length; }
 
-uint64_t bt_window_hash(const bt_window *v);
+/// Of the window and of the undisturbed ice.
+uint64_t bt_window_hash(const bt_world *w);
 
 #endif

@@ -40,6 +40,7 @@ void bt_world_free(bt_world *w)
     bt_tow_free(w->tow);
     bt_events_free(&w->events);
     free(w->window);
+    free(w->undisturbed);
     free(w);
 }
 
@@ -93,7 +94,7 @@ uint64_t bt_world_hash(const bt_world *w)
         for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].laws.n_memory; i++)
             sum += hash_memory(&w->cells->cell[k].laws.memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
-    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
+    if (w->window) sum = mix(sum ^ bt_window_hash(w));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

@@ -78,15 +78,17 @@ def test_the_study_that_it_makes(made):
     assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
 
 
-@pytest.mark.parametrize("domain, width", [
-    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 77}, 6170),
-    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 31}, None),
-    ({"sides": "periodic images", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": None}, None),
-    ({"sides": "walls", "width_m": 2500, "body_widths": 31.2249, "body_widths_needed": 77}, None),
-    ({"sides": "periodic images", "width_m": 10, "body_widths": 4.996, "body_widths_needed": 30}, 60.1)
+@pytest.mark.parametrize("across, sides, extent, there, needed, width", [
+    ("domain.width", "periodic images", 2500, 31.2249, 77, 6170),
+    ("domain.width", "periodic images", 2500, 31.2249, 31, None),
+    ("domain.width", "periodic images", 2500, 31.2249, None, None),
+    ("domain.width", "walls", 2500, 31.2249, 77, None),
+    ("domain.width", "periodic images", 10, 4.996, 30, 60.1),
+    ("domain.length", "periodic images", 10, 4.996, 30, None), # of a tow along y: what widens it is another question
 ])
-def test_the_width_that_the_ice_needs(domain, width):
-    assert domain_width.wide_enough(domain) == width
+def test_the_width_that_the_ice_needs(across, sides, extent, there, needed, width):
+    assert domain_width.wide_enough({"across": across, "sides": sides, "width_m": extent, "body_widths": there,
+                                     "body_widths_needed": needed}) == width
 
 
 PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration=10, output__window_start=2)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, TOW, USAGE, call, changed, run, write_case
+from harness import CASE, DONE, TOW, USAGE, call, changed, differing, run, write_case
 
 G = 9.81
 KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit",
@@ -236,3 +236,75 @@ def test_scales_that_are_none_are_refused(tmp_path, scale):
 def test_a_twin_out_of_range_is_refused(tmp_path):
     result = call("check", write_case(tmp_path, BERG), "--scale", "10000")
     assert result.returncode == CASE and "domain.length: becomes" in result.stderr and not result.stdout
+
+
+WEAK = changed(TOW, tow={"mode": "thrust", "speed": 0.13, "ramp": 2, "line_length": 3, "line_stiffness": "1 kN",
+                         "vessel": {"mass": 100, "bollard_pull": 2, "free_speed": 1}},
+               output__window_start=10)
+DRIVEN = {
+    "run": {"dt": 1, "duration": 400},
+    "domain": {"frame": "geographic", "length": 600, "width": 200, "ends": "moving", "sides": "periodic"},
+    "ice": {"concentration": 0.3, "size": 20, "thickness": 1},
+    "body": {"shape": "disc", "length": 40, "draft": 30},
+    "tow": {"speed": 0.4, "ramp": 20},
+    "air": {"wind_x": 12},
+    "output": {"window_start": 100},
+}
+
+
+def through(r, first, name="speed_through_ice"):
+    time, speed = r.series("time", name)
+    return speed[time >= first - 1e-9].mean()
+
+
+def test_a_vessel_that_cannot_hold_its_speed_is_held_against_what_it_makes_good(tmp_path):
+    """Half the speed is a fourth of the momentum estimate: at the speed ordered a run would seem a fourth as hard."""
+    r = run(tmp_path, WEAK)
+    e = r.summary["estimates"]
+    x, time = r.series("body_x", "time")
+    made_good = (x[-1] - x[time >= 10 - 1e-9][0]) / (time[-1] - 10)
+    assert 0 < e["speed_along_m_s"] < 0.8 * 0.13 and e["ordered_speed_m_s"] == pytest.approx(0.13)
+    assert e["speed_along_m_s"] == pytest.approx(made_good, rel=0.01)
+    assert e["speed_along_m_s"] == pytest.approx(through(r, 10), rel=1e-9)
+    assert f"at {e['speed_along_m_s']:.4g} m/s through the ice (0.13 ordered)" in r.result.stdout
+    ice = r.summary["estimates"]
+    a, h, w = ice["concentration"], ice["thickness_m"], ice["width_m"]
+    momentum = 910 * h * w * e["speed_along_m_s"]**2 * a * 0.9 / (0.9 - a)
+    assert e["marchenko_momentum"]["force_n"] == pytest.approx(momentum, rel=1e-9)
+
+
+def test_ice_that_the_wind_drives_along_is_not_met_at_the_speed_of_the_tow(tmp_path):
+    r = run(tmp_path, DRIVEN)
+    e, drift = r.summary["estimates"], r.summary["moving_window"]["ice_drift_x_m"] / 400
+    assert drift > 0.1
+    assert e["speed_along_m_s"] == pytest.approx(0.4 - drift, rel=0.02)
+    assert e["speed_along_m_s"] == pytest.approx(through(r, 100), rel=1e-9)
+    assert e["water_speed_m_s"] == pytest.approx(0.4, rel=1e-6)
+    assert through(r, 100, "speed_through_water") == pytest.approx(0.4, rel=1e-9)
+    # the same without a window: the ice is followed all the same; and before the run, by its free drift at the start
+    still = run(tmp_path, changed(DRIVEN, domain__ends="periodic"), name="still")
+    assert still.summary["estimates"]["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-3)
+    assert estimate(tmp_path, DRIVEN)["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.02)
+
+
+def test_a_run_goes_on_with_the_drift_that_it_had(tmp_path):
+    """Red when the way of undisturbed ice, or its velocity, is not in the checkpoint."""
+    case = changed(DRIVEN, domain__ends="periodic", ice__start="rest", run__duration=200)
+    whole = run(tmp_path, case, name="whole")
+    run(tmp_path, case, "--steps", 70, name="cut")
+    assert call("resume", "cut", "--quiet", cwd=tmp_path).returncode == DONE
+    assert differing(whole.dir / "result.h5", tmp_path / "cut/result.h5") == []
+    assert json.loads((tmp_path / "cut/summary.json").read_text())["estimates"] == whole.summary["estimates"]
+
+
+def test_no_jam_is_reported_where_no_ice_holds_the_body(tmp_path):
+    """Red when standing still is enough: a weak vessel that sets a berg going in open water, a line that has parted."""
+    weak = changed(WEAK, ice__concentration=0, tow__vessel__bollard_pull=0.2, run__duration=60)
+    parted = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 0.5, "line_length": 3, "line_stiffness": "10 kN",
+                               "line": {"breaking_load": 10}}, run__duration=60)
+    for name, case in (("weak", weak), ("parted", parted)):
+        r = run(tmp_path, case, name=name)
+        assert r.summary["stalled_s"] == 0, name
+        assert not any("jam" in w for w in r.summary["warnings"]), r.summary["warnings"]
+    assert any(e["kind"] == "adrift" for e in r.summary["events"])
+    assert r.summary["estimates"]["speed_along_m_s"] is None

@@ -76,6 +76,23 @@ def test_what_was_not_counted_is_not_known(tmp_path):
             assert np.all(np.isnan(x[:70])) and np.all(np.isfinite(x[70:])), name
 
 
+def test_speeds_that_were_not_measured_are_those_ordered(tmp_path):
+    """Red when a mean is taken over the steps that have them: it would be that of another window."""
+    case = changed(CRUSHING, tow__mode="line", tow__line_length=2, tow__line_stiffness="10 kN")
+    run(tmp_path, case, "--steps", 70, name="cut")
+    with h5py.File(tmp_path / "cut/checkpoint.h5", "r+") as f, h5py.File(tmp_path / "cut/result.h5", "r+") as old:
+        for medium in ("ice", "water"):
+            for name in (f"speed_through_{medium}", f"leeway_through_{medium}"):
+                del f["history"][name], old["series"][name]
+        del f["undisturbed"], f["stall/ice"], f["stall/pull"]
+    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
+    seal(tmp_path / "cut/result.h5", "result 1")
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == DONE, result.stderr
+    estimates = Run(tmp_path / "cut", result).summary["estimates"]
+    assert estimates["speed_along_m_s"] == estimates["ordered_speed_m_s"] == 0.3
+
+
 def test_numbers_where_only_dimensions_are_written(tmp_path):
     run(tmp_path, changed(CRUSHING, run__duration=6), "--steps", 30, name="cut")
     (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)

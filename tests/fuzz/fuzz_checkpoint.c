@@ -252,7 +252,7 @@ static void step_on(bt_running *r)
         bt_world_step(r->w);
         bt_sample s;
         bt_observe(r->w, bt_case_reference_speed(r->c), &s);
-        bt_stall_step(&r->totals.stall, r->w, r->roster.mean_size);
+        bt_stall_step(&r->totals.stall, r->w, s.ice_resistance, s.tow_force, r->roster.mean_size);
         sound = !bt_sample_fault(&s, bt_observe_applies(r->w));
     }
     if (r->w->impacts) bt_impacts_end(r->w->impacts);

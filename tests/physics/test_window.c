@@ -56,7 +56,8 @@ static void wedge_in_dilute_ice(void **state)
     }
     const bt_gid floes = w->bodies.n_global;
     add_body(w, 3, v, body, speed);
-    bt_window_create(w, 1, ahead, floes, false);
+    bt_undisturbed_create(w, floes, (const bool[2]){false, false});
+    bt_window_create(w, 1, ahead, floes);
     double impulse[2] = {0, 0}, before = 0, way = 0;
     while (bt_window_laps(w->window) < 4.3) {
         bt_sample s;
@@ -122,7 +123,10 @@ static void as_in_one_long_domain(void **state)
         const bt_gid floes = w[k]->bodies.n_global;
         double v[6] = {2.5 * big, 0, 0, big, 0, -big};
         add_body(w[k], 3, v, length - ahead, speed);
-        if (k == 0) bt_window_create(w[k], 1, ahead, floes, false);
+        if (k == 0) {
+            bt_undisturbed_create(w[k], floes, (const bool[2]){false, false});
+            bt_window_create(w[k], 1, ahead, floes);
+        }
     }
     double impulse[2] = {0, 0}, worst = 0, largest = 0;
     while (bt_window_laps(w[0]->window) < laps) {

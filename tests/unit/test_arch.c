@@ -32,8 +32,37 @@ static void the_width_counts_in_bodies_and_floes(void **state)
     assert_string_equal(a.sides, "walls");
     c.body.yaw = BT_PI / 2; // broadside on
     assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 10) < 1e-9);
-    c.tow.direction = BT_PI / 2;
+    c.tow.direction = BT_PI / 2, c.domain.length = 40;
     assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 20) < 1e-9);
+}
+
+/// What stands beside a tow along y is at the ends of the domain; on an oblique course, and of way-points, it is the
+/// narrower pair.
+static void the_extent_across_the_tow_counts(void **state)
+{
+    (void)state;
+    bt_case c = narrow();
+    c.domain.length = 10;
+    c.domain.ends = BT_BOUND_PERIODIC;
+    c.domain.sides = BT_BOUND_OPEN;
+    bt_arch a = bt_arch_of(&c, 0.8, 0.5);
+    assert_string_equal(a.key, "domain.width");
+    assert_true(isnan(a.needed) && !a.possible);
+    c.tow.direction = -BT_PI / 2, c.body.yaw = -BT_PI / 2;
+    a = bt_arch_of(&c, 0.8, 0.5);
+    assert_string_equal(a.key, "domain.length");
+    assert_string_equal(a.sides, "periodic images");
+    assert_true(fabs(a.bodies - 5) < 1e-12 && a.needed == 30 && a.possible);
+    c.tow.direction = c.body.yaw = BT_PI / 4; // between the two, where the sides are open
+    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.length");
+    c.domain.sides = BT_BOUND_WALL, c.domain.length = 60;
+    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.width");
+    c.tow.direction = c.body.yaw = 0;
+    c.domain.length = 20;
+    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.width");
+    double turn[] = {5, 0, 5, 30}; // along x, then along y
+    c.tow.waypoints = turn, c.tow.n_waypoints = 2;
+    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.length");
 }
 
 /// The disc of moved ice grows with the way: π (w/2)² δ = way/width, both in body widths.
@@ -94,6 +123,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_width_counts_in_bodies_and_floes),
+        cmocka_unit_test(the_extent_across_the_tow_counts),
         cmocka_unit_test(a_long_tow_needs_more_width),
         cmocka_unit_test(dense_ice_between_near_sides_can_arch),
     };

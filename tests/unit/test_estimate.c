@@ -21,6 +21,8 @@ static bt_estimate_input berg(double a)
                                .width = 80,
                                .speed = 0.5,
                                .along = 0.5,
+                               .water_speed = 0.5,
+                               .water_along = 0.5,
                                .ice_density = 910,
                                .water_density = 1027,
                                .drag = 4000,
@@ -76,7 +78,7 @@ static void a_current_across_or_from_behind(void **state)
 {
     (void)state;
     bt_estimate_input in = berg(0.5);
-    in.speed = 0.5, in.along = 0.3; // ½ · 910 · 80 · 0.5 · 0.3
+    in.speed = in.water_speed = 0.5, in.along = in.water_along = 0.3; // ½ · 910 · 80 · 0.5 · 0.3
     CHECK(LICHEY_HELLMER, in, 5460, true);
     CHECK(OPEN_WATER, in, 600, true);
     in.along = -0.3;
@@ -152,7 +154,7 @@ static void without_tow_nothing_has_a_value(void **state)
         assert_true(isnan(e.force) && !e.valid);
     }
     in = berg(0.8);
-    in.speed = in.along = 0;
+    in.speed = in.along = in.water_speed = in.water_along = 0;
     CHECK(LICHEY_HELLMER, in, 0, true);
     CHECK(OPEN_WATER, in, 0, true);
 }
@@ -184,6 +186,14 @@ static void conditions_follow_from_the_case(void **state)
                   "estimate: {length_scale: 10}\n");
     bt_estimate_conditions(&c, &in);
     assert_true(fabs(in.width - 80) < 1e-9 && fabs(in.speed - 0.5) < 1e-12 && fabs(in.along - 0.4) < 1e-12);
+    assert_true(in.water_speed == in.speed && in.water_along == in.along && in.ordered == in.along);
+    // Ice that the wind drives past the water, at (0.3, 0.8): the body falls behind it.
+    bt_estimate_input driven;
+    bt_estimate_ordered(&c, (const double[]){0.3, 0.8}, &driven);
+    assert_true(fabs(driven.along + 0.3) < 1e-12 && fabs(driven.speed - hypot(0.3, 0.3)) < 1e-12);
+    assert_true(driven.water_along == in.along && driven.water_speed == in.water_speed && driven.drag == in.drag);
+    const double drag = bt_estimate_at(BT_EST_OPEN_WATER, &driven).force;
+    assert_true(fabs(drag / (in.drag * 0.5 * 0.4) - 1) < 1e-12); // of the water, whatever the ice does
     assert_true(in.concentration == 0.6 && in.thickness == 0.7 && in.floe_radius == 15 && in.restitution == 0.25);
     assert_true(in.p_star == 2000 && in.p_s == 130);
     // across the flow: (0.8, 0.6) · (80, 20) = 76 m; ½ · 1000 · 0.85 · 10 · 76 + 1000 · 5e-4 · 1600

@@ -146,14 +146,15 @@ static void stall_windows(void **state)
     bt_stall s = {0};
     double x = 3;
     const struct {
-        double asked, moves, time;
+        double asked, moves, ice, time; // of a pull of 8 N
         int64_t windows;
-    } parts[] = {{0.5, 0, 10, 5}, {0.5, 0.4, 10, 5}, {0, 0, 100, 5}, {0.5, 0.02, 10, 10}, {0.5, 0.03, 10, 10}};
-    bt_stall_add(&s, 0.05, 0.1, x, 0, 1);
-    for (int p = 0; p < 5; p++) {
+    } parts[] = {{0.5, 0, 5, 10, 5},     {0.5, 0.4, 5, 10, 5},   {0, 0, 5, 100, 5}, {0.5, 0.02, 5, 10, 10},
+                 {0.5, 0.03, 5, 10, 10}, {0.5, 0, 3.9, 10, 10}, {0.5, 0, 4.1, 10, 15}};
+    bt_stall_add(&s, 0.05, 0.1, (const double[]){x, 0}, 5, 8, 1);
+    for (int p = 0; p < (int)(sizeof parts / sizeof *parts); p++) {
         for (int k = 0; k < (int)(parts[p].time / 0.1 + 0.5); k++) {
             x += 0.1 * parts[p].moves;
-            bt_stall_add(&s, 0.1 * parts[p].asked, 0.1, x, 0, 1 - 1e-9);
+            bt_stall_add(&s, 0.1 * parts[p].asked, 0.1, (const double[]){x, 0}, parts[p].ice, 8, 1 - 1e-9);
         }
         assert_int_equal(s.windows, parts[p].windows);
         CHECK_CLOSE(s.time, 2 * (double)parts[p].windows, 1e-6);

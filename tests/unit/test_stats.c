@@ -246,7 +246,26 @@ static void the_transient_is_cut(void **s)
     assert_true(bt_stats_steady_start(x, N, 700) >= 700);
     for (int i = 0; i < N; i++) x[i] = i;
     assert_in_range(bt_stats_steady_start(x, N, 0), N / 2 - 5, N / 2);
-    assert_int_equal(bt_stats_steady_start(x, N, 1800), 1800);
+    // The middle of what follows: a long ramp must not leave nothing to search.
+    assert_in_range(bt_stats_steady_start(x, N, 1200), 1600 - 5, 1600);
+    assert_in_range(bt_stats_steady_start(x, N, 1800), 1900 - 5, 1900);
+}
+
+/// A series that settles to its end has its minimum at the last start, however far apart the starts lie.
+static void the_end_of_the_search_is_known(void **s)
+{
+    (void)s;
+    for (int64_t n = 19990; n < 90000; n += 997) {
+        double *x = malloc((size_t)n * sizeof *x);
+        assert_non_null(x);
+        for (int64_t i = 0; i < n; i++) x[i] = exp(-2.0 * (double)i / (double)n);
+        for (int64_t first = 0; first < n; first += 3 * n / 7) {
+            const int64_t last = bt_stats_last_start(n, first);
+            assert_int_equal(bt_stats_steady_start(x, n, first), last);
+            assert_in_range(last, first + (n - first) / 2 - bt_stats_start_step(n - first), first + (n - first) / 2);
+        }
+        free(x);
+    }
 }
 
 /// A long series: the starts that are looked at lie apart so far that they are few, and the one that is found is the
@@ -284,6 +303,7 @@ int main(void)
         cmocka_unit_test(not_a_number_stays_visible),
         cmocka_unit_test(a_large_offset_does_not_drown_the_spread),
         cmocka_unit_test(the_transient_is_cut),
+        cmocka_unit_test(the_end_of_the_search_is_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -253,12 +253,13 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
     for (size_t k = 0; k < sizeof reported / sizeof *reported; k++) {
         bt_case d = c;
         bt_run_totals t = totals(600);
-        bt_window window = {.renewed = 50, .missed = k == 6 ? 10 : 0, .length = 10};
+        bt_window window = {.sign = 1, .renewed = 50, .missed = k == 6 ? 10 : 0, .length = 10};
+        const bt_undisturbed ice = {.drift_x = -1};
         if (k == 0) d.tow.ramp = 30;
         if (k == 3) d.tow.programme = programme, d.tow.n_programme = 3;
         if (k == 4) t.events = &events;
         if (k == 5) t.stall = (bt_stall){.windows = 1, .time = 6};
-        if (k == 6) t.window = &window;
+        if (k == 6) t.window = &window, t.undisturbed = &ice;
         char *json = summary_of(&d, 600, &t, FLOES, k == 1 ? one_wild_step : k == 2 ? few_unconverged : sound_tow);
         assert_string_equal(json_value(json, "verdict"), "\"not steady\"");
         if (!strstr(json_value(json, "reason"), reported[k]))
@@ -290,6 +291,87 @@ static void without_a_towed_body_forces_are_null(void **state)
     free(json);
 }
 
+static void half_the_speed(bt_sample *s, int i)
+{
+    s->speed_through_ice = i < 290 ? 9 : 0.25 + 0.05 * (i % 2);
+    s->leeway_through_ice = i < 290 ? 9 : 0.3;
+    s->speed_through_water = 0.5, s->leeway_through_water = -0.1;
+}
+
+static void before_it_was_measured(bt_sample *s, int i)
+{
+    half_the_speed(s, i);
+    if (i < 400) s->speed_through_ice = NAN;
+}
+
+/// Estimates are those of the speed that the body made through the ice in the window; of the speed ordered where a part
+/// of it is not known; and nothing tows a body that is adrift.
+static void estimates_take_the_speed_of_the_window(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 30;
+    c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
+    c.tow.speed = 0.5;
+    const bt_run_totals t = totals(600);
+    char *json = summary_of(&c, 600, &t, FLOES, half_the_speed);
+    assert_true(fabs(atof(json_value(json, "speed_along_m_s")) - 0.275) < 1e-3);
+    assert_true(fabs(atof(json_value(json, "speed_m_s")) - hypot(0.275, 0.3)) < 1e-3);
+    assert_true(fabs(atof(json_value(json, "water_speed_m_s")) - hypot(0.5, 0.1)) < 1e-9);
+    assert_true(fabs(atof(json_value(json, "ordered_speed_m_s")) - 0.5) < 1e-12);
+    free(json);
+    json = summary_of(&c, 600, &t, FLOES, before_it_was_measured);
+    assert_true(fabs(atof(json_value(json, "speed_along_m_s")) - 0.5) < 1e-12);
+    free(json);
+    bt_event event[] = {{.time = 45, .kind = BT_EVENT_ADRIFT, .value = 7}};
+    const bt_events events = {.event = event, .n = 1};
+    bt_run_totals adrift = totals(600);
+    adrift.events = &events;
+    json = summary_of(&c, 600, &adrift, FLOES, half_the_speed);
+    assert_string_equal(json_value(json, "speed_along_m_s"), "null");
+    assert_null(strstr(json, "\"compares\": true"));
+    free(json);
+}
+
+static void never_touched(bt_sample *s, int i)
+{
+    s->ice_resistance = s->ice_resistance_budget = i < 100 ? 50 : 0;
+    s->tow_force = s->ice_resistance + 21;
+}
+
+/// A body that no floe touched: no number of samples says what the ice resists, and no estimate is held against it.
+static void a_body_that_met_no_ice_tells_nothing(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    bt_run_totals t = totals(600);
+    for (int ice = 0; ice < 2; ice++) {
+        t.concentration = ice ? 0.2 : 0;
+        char *json = summary_of(&c, 600, &t, FLOES, never_touched);
+        assert_true(!strstr(json, "the body met no ice within the window") == !ice);
+        if (ice) assert_string_equal(json_value(json, "verdict"), "\"too short\"");
+        if (ice) assert_null(strstr(json, "\"simulated_over_estimate\": 0"));
+        free(json);
+    }
+}
+
+/// The ice that overtakes the body in a moving window is what it met before.
+static void ice_that_overtakes_a_window_is_reported(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    bt_run_totals t = totals(600);
+    const bt_undisturbed ice = {.drift_x = -12};
+    for (int way = 0; way < 2; way++) {
+        const bt_window window = {.sign = -1, .length = 40, .start = 3, .rear = way ? 14 : 16};
+        t.window = &window, t.undisturbed = &ice;
+        char *json = summary_of(&c, 600, &t, FLOES, NULL);
+        assert_true(!strstr(json, "carried the ice 12 m ahead and the moving window went 11 m") == !way);
+        free(json);
+    }
+}
+
 /// Of the branches that a run has, the strongest, whichever it is.
 static void the_peak_tension_is_of_the_strongest_branch(void **state)
 {
@@ -312,6 +394,9 @@ int main(void)
         cmocka_unit_test(every_doubt_is_reported),
         cmocka_unit_test(the_window_serves_every_series),
         cmocka_unit_test(what_no_mean_goes_across_is_a_verdict),
+        cmocka_unit_test(estimates_take_the_speed_of_the_window),
+        cmocka_unit_test(a_body_that_met_no_ice_tells_nothing),
+        cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
         cmocka_unit_test(without_a_towed_body_forces_are_null),
     };
     int failed;

@@ -39,7 +39,8 @@ static void add_body_and_window(bt_world *w, double sign, double body_speed)
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
     *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = sign, .speed = body_speed, .dt = w->par.dt, .travel_x = x};
-    bt_window_create(w, sign, AHEAD, n_floes, false);
+    bt_undisturbed_create(w, n_floes, (const bool[2]){false, false});
+    bt_window_create(w, sign, AHEAD, n_floes);
 }
 
 static bt_world *empty(double dt)
@@ -255,16 +256,17 @@ static void drifts_as_undisturbed_ice(void **state)
         assert_true(w->window->renewed > 8 && w->window->kept + w->window->missed == 0);
         for (int k = 0; k < 8; k++) {
             const bt_vel v = w->bodies.vel[bt_world_index(w, k)];
-            CHECK_CLOSE(v.x, w->window->vel.x, 1e-12);
-            CHECK_CLOSE(v.y, w->window->vel.y, 1e-12);
+            CHECK_CLOSE(v.x, w->undisturbed->vel.x, 1e-12);
+            CHECK_CLOSE(v.y, w->undisturbed->vel.y, 1e-12);
             if (!wind) assert_true(v.x == 0.1 && v.y == 0);
             CHECK_CLOSE(unwrapped(w, k),
-                        1 + 5 * k + w->window->drift_x + LENGTH * w->bodies.home[bt_world_index(w, k)].copy, 1e-9);
-            CHECK_CLOSE(pose(w, k).y, 2 * (k % 2) + w->window->drift_y, 1e-9);
+                        1 + 5 * k + w->undisturbed->drift_x + LENGTH * w->bodies.home[bt_world_index(w, k)].copy, 1e-9);
+            CHECK_CLOSE(pose(w, k).y, 2 * (k % 2) + w->undisturbed->drift_y, 1e-9);
         }
         if (wind)
-            assert_true(w->window->drift_y < -0.5 && w->window->drift_x > 1.1 * 0.1 * w->par.dt * (double)w->step);
-        else CHECK_CLOSE(w->window->drift_x, 0.1 * w->par.dt * (double)w->step, 1e-9);
+            assert_true(w->undisturbed->drift_y < -0.5 &&
+                        w->undisturbed->drift_x > 1.1 * 0.1 * w->par.dt * (double)w->step);
+        else CHECK_CLOSE(w->undisturbed->drift_x, 0.1 * w->par.dt * (double)w->step, 1e-9);
         bt_world_free(w);
     }
 }
@@ -315,7 +317,7 @@ static void put_as_new(void **state)
     assert_int_equal(n_pairs, 2);
     assert_false(w->cells->relabel);
     b->home[of[0]].x = -1e-20;
-    w->window->vel = (bt_vel){.x = 0.3, .y = 0.1};
+    w->undisturbed->vel = (bt_vel){.x = 0.3, .y = 0.1};
     w->tow->travel_x += 4.5;
     bt_window_begin(w);
     assert_int_equal(w->window->renewed_now, 2);
@@ -373,17 +375,18 @@ static void held_by_walls(void **state)
         bt_world *w = bt_world_create(&p);
         add_floe(w, 2, 0, 0);
         add_body_and_window(w, 1, speed);
-        w->window->held = held;
-        for (int k = 0; k < 10; k++) bt_window_advance(w);
-        assert_true(w->window->drift_x > 0.1);
-        assert_true(held ? w->window->drift_y == 0 : w->window->drift_y > 0.1);
+        free(w->undisturbed);
+        bt_undisturbed_create(w, 1, (const bool[2]){false, held});
+        for (int k = 0; k < 10; k++) bt_undisturbed_advance(w);
+        assert_true(w->undisturbed->drift_x > 0.1);
+        assert_true(held ? w->undisturbed->drift_y == 0 : w->undisturbed->drift_y > 0.1);
         bt_world_free(w);
     }
     bt_world *w = empty(0.1);
     add_floe(w, 2, 0, 0);
     add_body_and_window(w, 1, speed);
     free(w->window);
-    bt_window_create(w, 1, 4, 1, false);
+    bt_window_create(w, 1, 4, 1);
     assert_true(w->window->zone == 2 && w->window->stride == 0.5);
     bt_world_free(w);
 }
@@ -400,9 +403,9 @@ static void hashed(void **state)
     w->window->rear += 1;
     assert_true(bt_world_hash(w) != h);
     w->window->rear -= 1;
-    w->window->drift_x += 1;
+    w->undisturbed->drift_x += 1;
     assert_true(bt_world_hash(w) != h);
-    w->window->drift_x -= 1;
+    w->undisturbed->drift_x -= 1;
     w->bodies.home[bt_world_index(w, 0)].copy++;
     assert_true(bt_world_hash(w) != h);
     w->bodies.home[bt_world_index(w, 0)].copy--;

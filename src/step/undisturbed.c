@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// Free drift of the mean floe, step by step; what it is for: step/undisturbed.h.
+#include "step/undisturbed.h"
+
+#include <math.h>
+
+#include "body/bodies.h"
+#include "force/forces.h"
+
+/// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
+/// no direction has a width of its own. Mean width of a convex outline: perimeter / π (Cauchy).
+static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
+{
+    const bt_bodies *b = &w->bodies;
+    double n = 0;
+    for (bt_gid g = 0; g < n_floes; g++) {
+        const bt_idx i = bt_world_index(w, g);
+        if (b->motion[i] != BT_DYNAMIC) continue;
+        double perimeter = 0;
+        for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
+        v->mass += b->mass[i];
+        v->share += b->share[i] * b->mass[i];
+        v->inertia += b->inertia[i];
+        v->radius += b->radius[i];
+        v->area += b->area[i];
+        v->thickness += b->thickness[i];
+        v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
+        v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
+        // relative to the water, so that the mean of floes that rest in it does to the last bit
+        v->vel.x += b->vel[i].x - w->par.water_u;
+        v->vel.y += b->vel[i].y - w->par.water_v;
+        n++;
+    }
+    if (n == 0) { // as the water goes
+        v->vel = (bt_vel){.x = w->par.water_u, .y = w->par.water_v};
+        return;
+    }
+    v->share /= v->mass;
+    v->mass /= n, v->drag.water_skin /= n, v->drag.air_skin /= n;
+    v->inertia /= n, v->radius /= n, v->area /= n, v->thickness /= n;
+    v->vel.x = w->par.water_u + v->vel.x / n, v->vel.y = w->par.water_v + v->vel.y / n;
+}
+
+void bt_undisturbed_create(bt_world *w, bt_gid n_floes, const bool held[2])
+{
+    bt_undisturbed *v = w->undisturbed = bt_alloc(1, sizeof *v);
+    *v = (bt_undisturbed){.held = {held[0], held[1]}};
+    mean_floe(w, v, n_floes);
+    if (held[0]) v->vel.x = 0;
+    if (held[1]) v->vel.y = 0;
+}
+
+/// By the table of force laws, as of every floe; so what has the velocity of the water keeps it to the last bit.
+void bt_undisturbed_advance(bt_world *w)
+{
+    bt_undisturbed *v = w->undisturbed;
+    if (!v) return;
+    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
+    const bt_bodies one = {
+        .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
+    bt_force_body mean = {
+        .drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
+    bt_vel u = v->mass > 0 ? bt_forces_drift(w, &mean) : (bt_vel){.x = w->par.water_u, .y = w->par.water_v};
+    u.w = 0;
+    if (v->held[0]) u.x = 0;
+    if (v->held[1]) u.y = 0;
+    v->vel = u;
+    v->drift_x += w->par.dt * u.x;
+    v->drift_y += w->par.dt * u.y;
+}
