@@ -111,7 +111,7 @@ def exceedance(fields, gap):
     """Rows of level, share of the time above it, and how often an hour it is exceeded, clusters counted once."""
     every, out = np.concatenate([f["peak"] for f in fields]), []
     for level in np.linspace(np.median(every), every.max(), LEVELS + 1)[:-1]:
-        above = [np.sum(f["peak"] > level) for f in fields]
+        above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
         clusters = [len(stat_extreme.clusters(f["time"], f["peak"], level, gap)) for f in fields]
         out.append({
             "level": level, "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields]),

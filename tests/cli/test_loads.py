@@ -130,6 +130,42 @@ def test_a_correlated_signal_of_few_clusters_has_no_tail():
     assert "run longer" in found["block_maxima"]["refused"]
 
 
+def saturated_fields(cap, time_scale, at, fields=8, n=3600):
+    """AR(1) of 0.99 about 90 % of a cap, which its values do not exceed; at: share of an sd where the cap is."""
+    rng, time = np.random.default_rng(1), np.arange(1.0, n + 1)
+    return [stat_load.field_of(time, cap * np.minimum(1 + 0.3 * (made_up.ar1(0.99, n, rng) - at), 1.0), 1.0, n,
+                               time_scale) for _ in range(fields)]
+
+
+@pytest.mark.parametrize("cap, time_scale, at", [(1.0, 1.0, -0.5), (1e6, 30.0, -2.0), (1e6, 30.0, 0.3),
+                                                 (2 ** 20, 1.0, 0.3), (1e6, 1.0, 1.0)])
+def test_a_saturated_load_has_no_tail(cap, time_scale, at):
+    """Most of the time at the cap, where no sample is above another, or the maxima of the clusters at it."""
+    fields = saturated_fields(cap, time_scale, at)
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0, 468.0], 1)
+    assert f"saturated at {cap:.4g} N" in found["over_threshold"]["refused"]
+    assert "refused" in found["block_maxima"]
+
+
+def test_a_cap_that_is_hardly_ever_reached_is_no_saturation():
+    fields = saturated_fields(1e6, 1.0, 2.9)
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)
+    assert "refused" not in found["over_threshold"]
+
+
+def test_values_that_differ_by_rounding_are_the_same():
+    noise = 1e-15 * np.arange(5)
+    assert stat_extreme.commonest(np.array([*(1 + noise), 0.0, 0.0, 2.0])) == (1.0, 5)
+    assert not stat_extreme.exceeds(1e6 * (1 + noise), 1e6).any() and stat_extreme.exceeds(np.array([1.001]), 1.0).all()
+    assert stat_extreme.saturated(1e6 * (1 + noise), "blocks") == \
+        "saturated at 1e+06 N, which 5 of 5 blocks reach and none exceeds"
+    assert stat_extreme.saturated(np.arange(50.0), "blocks") == stat_extreme.saturated(np.zeros(0), "blocks") == ""
+    time, peak = np.arange(1.0, 1001.0), np.where(np.arange(1000) < 700, 0.0, np.arange(1000.0))
+    field = {"time": time, "peak": peak, "start": 0.0, "hours": 1000 / 3600}
+    assert stat_extreme.by_blocks([field], [1.0], 40)["refused"] == \
+        "the largest of 28 of 40 blocks is the same, 0 N: no GEV"
+
+
 # ---- ensembles
 
 N = 2000
