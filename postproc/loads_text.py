@@ -140,8 +140,8 @@ def signals(s, markdown):
     if not rows:
         return "No loads: no member has a window with a towed body."
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
-            "that means differ a little from those of the whole window. In the start: the largest before the window, "
-            "which is in no other number. 95 %: interval over fields.")
+            "that means differ a little from those of the whole window. In the start: the largest of the means that "
+            "begin before the window, which is in no other number. 95 %: interval over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
 
 

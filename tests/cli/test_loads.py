@@ -45,14 +45,29 @@ def test_the_filter_by_hand():
 
 
 def test_the_start_is_what_lies_before_the_window():
-    """Means over the same time that end before the window; where the load is not there they are passed over."""
+    """Means over the same time that begin before the window; where the load is not there they are passed over."""
     time, x = np.arange(1.0, 15.0), np.array([np.nan, 5, 9, 1, 50, 50, 0, 0, 0, 0, 0, 0, 0, 0])
     assert stat_load.field_of(time, x, 5.0, 14.0, 1.0)["start_up"] == {"largest": 9, "time_s": 3}
-    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
-    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] is None  # one sample is no mean of two
+    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 25.5, "time_s": 5}
+    assert stat_load.field_of(time, x, 4.0, 13.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
+    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] == {"largest": 0, "time_s": 2}
+    assert stat_load.field_of(time, x[::-1], 1.0, 13.0, 2.0)["start_up"] is None  # the first mean is that of the window
     assert stat_load.start_up(time[:2], np.full(2, np.nan), 1) is None
     panels = np.array([[4.0, 0, 4], [1.0, 7, 1]]).T
     assert stat_load.start_up(time[:3], panels, 2) == {"largest": 4, "time_s": 2}
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 7.0, 30.0])
+def test_every_mean_is_in_the_window_or_in_the_start(scale):
+    """A peak across the start of the window is in no mean that begins in it."""
+    time, x = np.arange(1.0, 401.0), np.random.default_rng(0).normal(100, 1, 400)
+    x[85:115] = 500
+    for start in (80.0, 95.0, 100.0, 115.0, 130.0):
+        f = stat_load.field_of(time, x, start, 400.0, scale)
+        every = stat_load.moving_mean(x, int(scale))
+        assert max(f["start_up"]["largest"], f["peak"].max()) == pytest.approx(every.max(), rel=1e-12)
+        assert f["start_up"]["time_s"] < f["time"][0]
+        assert len(f["peak"]) + np.sum(time[int(scale) - 1:] < f["time"][0]) == len(every)
 
 
 def test_the_filter_leaves_impulses_alone():
