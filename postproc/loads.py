@@ -22,6 +22,7 @@ import stat_extreme
 import stat_load
 import stat_mean
 from bergtow_read import Run, RunError
+from text_table import quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -90,23 +91,32 @@ def scaling(e, rows):
     return float(np.sqrt(found[0])) if len(found) and np.isfinite(found[0]) and found[0] > 0 else 1.0
 
 
-def _fields(e, rows, time_scale):
-    """{name: (Load, [field, ...])} of a condition, the fields as stat_load.field_of makes them. A load is left out
-    where it is constant, and where members convert its collisions in different ways."""
-    out = {}
+def gather(e, rows, options):
+    """({name: (Load, [field, ...])}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of makes
+    them, and the loads that are left out: those that are constant over all fields together, and those whose collisions
+    the members convert in different ways. A field in which a load is constant is a field like any other: ice that the
+    tow does not meet is a load of zero, and its hours count. options: time_scale (None: the default)."""
+    out, why = {}, {}
+    time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
     for m in rows:
         start, end = e.number("window_start_s", m), e.number("window_end_s", m)
         some, time = of_member(e, m)
         for load, x in some:
             scale = 0.0 if load.conversion else time_scale
             field = stat_load.field_of(time, x, start, end, scale) if np.isfinite([start, end]).all() else None
-            if field is not None and np.ptp(field["peak"]) > 0:
+            if field is not None:
                 out.setdefault(load.name, []).append((load, field | {"member": int(m)}))
-    return {
-        name: (some[0][0], [field for _, field in some])
-        for name, some in out.items()
-        if len({load.conversion for load, _ in some}) == 1
-    }
+    found = {}
+    for name, some in out.items():
+        load, fields = some[0][0], [field for _, field in some]
+        if len({load.conversion for load, _ in some}) > 1:
+            why[name] = {"label": load.label, "why": "members convert its collisions in different ways"}
+        elif stat_load.constant(fields):
+            why[name] = {"label": load.label, "why": f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all "
+                                                     f"{len(fields)} fields"}
+        else:
+            found[name] = load, fields
+    return found, why
 
 
 def _design(found, hours, total):
@@ -125,13 +135,13 @@ def _design(found, hours, total):
     }
 
 
-def statistics(e, rows, options):
+def statistics(e, rows, options, gathered=None):
     """{name: all statistics of a load} of the members of a condition; options: time_scale and tow_hours (None: the
-    default), probability, hours, resamples."""
-    shorter = scaling(e, rows)
-    tow_hours = options.tow_hours or TOW_HOURS / shorter
+    default), probability, hours, resamples. gathered: what gather() found, where that is known."""
+    gathered = gather(e, rows, options)[0] if gathered is None else gathered
+    tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
-    for name, (load, fields) in _fields(e, rows, options.time_scale or TIME_SCALE / shorter).items():
+    for name, (load, fields) in gathered.items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
         first = max((f for f in fields if f["start_up"]), key=lambda f: f["start_up"]["largest"], default=None)
         start_up = first and first["start_up"]
@@ -143,7 +153,7 @@ def statistics(e, rows, options):
             "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
-            "fields": len(fields), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "fields": len(fields), "members": len(rows), "hours": total, "gap_s": gap, **stat_load.summary(fields),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)

@@ -4,6 +4,7 @@ from itertools import zip_longest
 
 import numpy as np
 
+import stat_load
 import text_table
 from text_table import hours_text, number, pair, scale, table
 
@@ -138,11 +139,29 @@ def signals(s, markdown):
                     f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return "No loads: no member has a window with a towed body."
+        return "\n".join(["No loads: no member has a window with a towed body.", *left_out(s)])
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
             "that means differ a little from those of the whole window. In the start: the largest of the means that "
             "begin before the window, which is in no other number. 95 %: interval over fields.")
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *left_out(s), *conversions(s), *panel_lines(s)])
+
+
+def left_out(s):
+    """Sentences on what is in no number: members without a load, and loads without statistics."""
+    few, why = {}, {}
+    for c in s["conditions"]:
+        lacking = {}
+        for x in c["loads"].values():
+            lacking.setdefault((x["members"] - x["fields"], x["members"]), []).append(x["label"])
+        for (n, all_of_them), labels in lacking.items():
+            if n:
+                few.setdefault(tuple(labels), []).append(f"{c['label']} ({n} of {all_of_them})")
+        for x in c["loads_left_out"].values():
+            why.setdefault((x["label"], x["why"]), []).append(c["label"])
+    return [f"Members without {' and '.join(labels)}, or without a window of {stat_load.LEAST_SCALES} time scales in "
+            f"which they are known throughout, are in no number of these: {several(where)}."
+            for labels, where in few.items()] + [
+                f"{sentence(label)} is left out: {reason}: {several(where)}." for (label, reason), where in why.items()]
 
 
 def estimate(found, factor):

@@ -104,10 +104,17 @@ def ratio_over_fields(counts, sizes):
     return _jackknife(counts.sum() / sizes.sum(), without)
 
 
+def constant(fields):
+    """Is a signal the same in all fields together, but for rounding? What differs between them is none."""
+    peaks = np.concatenate([f["peak"] for f in fields])
+    return bool(np.ptp(peaks) <= stat_extreme.tie(peaks))
+
+
 def gap_of(fields):
-    """Time without exceedance that ends a cluster, s: two correlation times of the fields, a time scale at least."""
-    taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields]
-    return float(max(2 * np.nanmedian(taus), max(f["scale"] for f in fields)))
+    """Time without exceedance that ends a cluster, s: two correlation times of the fields in which the signal changes,
+    a time scale at least."""
+    taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields if not constant([f])]
+    return float(max(2 * np.nanmedian(taus) if taus else 0.0, max(f["scale"] for f in fields)))
 
 
 def exceedance(fields, gap):

@@ -133,6 +133,10 @@ def _of_the_sample(e, rows, c, load):
             out.append((words, f"{n} of {len(rows)} members"))
     if c["drift"]["verdict"] == "not steady":
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
+    if load["fields"] < load["members"]:
+        out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
+                    "in which it is known throughout, are in no number of it",
+                    f"{load['members'] - load['fields']} of {load['members']} members"))
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
                     f"{load['fields']}"))
@@ -201,7 +205,9 @@ def statement(e, rows, c):
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if tow is None:
-        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+        left = c["loads_left_out"].get("tow_force")
+        warned.append(("no tow force that varies", left["why"]) if left else
+                      (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)

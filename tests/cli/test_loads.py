@@ -17,6 +17,8 @@ from test_postproc import script
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
+import ensemble  # noqa: E402
+import ensemble_text  # noqa: E402
 import loads  # noqa: E402
 import loads_text  # noqa: E402
 import plot_ensemble  # noqa: E402
@@ -24,6 +26,7 @@ import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
 import statement as statement_module  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
+from report_ensemble import OPTIONS  # noqa: E402
 
 TRIALS = 14
 
@@ -360,6 +363,76 @@ def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):
     e = Ensemble(folder)
     found = loads.statistics(e, e.conditions()[0].finished, options())
     assert found["tow_force"]["fields"] == 6 and found["line_tension_1"]["fields"] == 5
+
+
+SPARSE = 3000  # samples of a field
+
+
+def sparse(folder, fields=10, meet=4, n=SPARSE, changes=None):
+    """Ensemble of ice so sparse that `meet` of the fields meet any floe; the drag is constant, the thrust saturated.
+    changes: {member: what made_up.member takes}."""
+    rng, members = np.random.default_rng(1), []
+    for k in range(fields):
+        x = np.zeros(n)
+        for at in rng.integers(60, n - 100, 16 if k < meet else 0):
+            x[at:at + 40] += rng.exponential(1000)
+        thrust = np.minimum(9e5 + 3e5 * made_up.ar1(0.98, n, rng), 1e6)
+        series = {"tow_force": x, "ice_resistance": x, "line_tension_1": np.full(n, 1234.567), "vessel_thrust": thrust}
+        members.append(made_up.member(x, {"ice.concentration": 0.1}, 0, attributes=SERIES,
+                                      **{"more": series} | (changes or {}).get(k, {})))
+    return made_up.write(folder, members)
+
+
+def of_all(folder, **changes):
+    """statistics.json of a folder as a dict, and its tables."""
+    s = ensemble.statistics(Ensemble(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
+    return s, ensemble_text.report(s, False)
+
+
+def test_fields_that_meet_no_ice_are_fields(tmp_path):
+    """Their zeros and their hours count: the mean is that of all fields, and so is the rate."""
+    s, text = of_all(sparse(tmp_path / "a"))
+    c, = s["conditions"]
+    for name in ("tow_force", "ice_resistance"):
+        x = c["loads"][name]
+        assert x["fields"] == x["members"] == 10 and x["hours"] == pytest.approx(10 * (SPARSE - 29) / 3600)
+        assert x["mean"]["value"] == pytest.approx(c["resistance"]["mean"], rel=0.03)  # less the window's first 30 s
+        assert x["over_threshold"]["rate_per_hour"] == pytest.approx(x["over_threshold"]["clusters"] / x["hours"])
+        assert "blocks is the same, 0 N" in x["block_maxima"]["refused"]
+    assert "Members without" not in text
+
+
+def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
+    few = {"more": {"tow_force": np.where(np.arange(SPARSE) == 999, np.nan, 1.0)}}
+    s, text = of_all(sparse(tmp_path / "a", changes={0: few, 9: few, 5: {"window": {"start_s": SPARSE - 100.0}}}))
+    c, = s["conditions"]
+    x = c["loads"]["tow_force"]
+    assert x["fields"] == 7 and x["members"] == 10
+    assert ("members without a tow force, or without a window of 5 time scales in which it is known throughout, are in "
+            "no number of it", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
+    assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
+        "which they are known throughout, are in no number of these: concentration 10 % (3 of 10)." in text
+    # a moving mean leaves 2e-10 N of a constant
+    assert "Line tension is left out: constant, 1230 N, in all 7 fields: concentration 10 %." in text
+    assert c["loads_left_out"]["line_tension_1"]["label"] == "line tension"
+
+
+def test_a_constant_tow_force_is_named(tmp_path):
+    _, text = of_all(sparse(tmp_path / "a", meet=0, fields=3))
+    assert "No design tow force. WARNING: No tow force that varies (constant, 0 N, in all 3 fields)." in text
+
+
+def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
+    s, text = of_all(sparse(tmp_path / "a"))
+    thrust = s["conditions"][0]["loads"]["vessel_thrust"]
+    assert "saturated at 1e+06 N" in thrust["over_threshold"]["refused"] and "value" not in thrust["design"]
+    assert "saturated at 1e+06 N" in text and thrust["largest"] == pytest.approx(1e6)
+    ensemble.write(s, tmp_path, False)
+    e = Ensemble(tmp_path / "a")
+    for name in ("tow_force", "vessel_thrust"):
+        plot_ensemble.draw_above(e, s["conditions"], name)
+        plot_ensemble.draw_returns(e, s["conditions"], name)
+    matplotlib.pyplot.close("all")
 
 
 def test_the_picture_of_return_levels(statement):
