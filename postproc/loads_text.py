@@ -6,7 +6,7 @@ import numpy as np
 
 import stat_load
 import text_table
-from text_table import hours_text, number, pair, scale, table
+from text_table import hours_text, number, pair, quantity, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %
@@ -62,8 +62,20 @@ def design(s, markdown):
         f"{asked(s)}. 95 %: interval over fields, without what the warnings name. * beyond the hours "
         f"simulated: extrapolated by the tail."
     ]
-    notes += [holds_for(s)] if holds_for(s) else []
+    notes += [text for text in (steps(s), holds_for(s)) if text]
     return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+
+
+def steps(s):
+    """What the tensions of single steps reach, which are in no design tension; "" without a line."""
+    found = {}
+    for c in s["conditions"]:
+        for x in c["design"]["branches"]:
+            load = f", breaking load {quantity(x['breaking_load'], 'N')}" if np.isfinite(x["breaking_load"]) else ""
+            found.setdefault(x["label"], []).append(f"{c['label']} {quantity(x['largest_step'], 'N')}{load}")
+    said = [f"{label}: {several(some)}" for label, some in found.items()]
+    return ("A design tension is the same moving mean: snap loads, which are shorter, are not in it. Largest mean over "
+            f"one step, the start included; {'. '.join(said)}.") if said else ""
 
 
 def holds_for(s):

@@ -148,6 +148,7 @@ def answer(e, s, case, results):
     out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
     carried = "".join(cell for row in rows for cell in row[1:])
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
+    notes += [loads_text.steps(s)] if loads_text.steps(s) else []
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",

@@ -6,6 +6,7 @@ import json
 import sys
 from pathlib import Path
 
+import h5py
 import matplotlib
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ import plot_ensemble  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
 import statement as statement_module  # noqa: E402
+from bergtow_read import Run  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 from report_ensemble import OPTIONS  # noqa: E402
 
@@ -341,7 +343,11 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
     found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
-    assert "no upper bound" not in found and "above the breaking load of the line: concentration 90 % (2.00 MN" in found
+    assert "no upper bound" not in found
+    above = "above the breaking load of the line"
+    assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
+    # in the start
+    assert f"step, by which a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 MN)" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):
@@ -433,6 +439,107 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
         plot_ensemble.draw_above(e, s["conditions"], name)
         plot_ensemble.draw_returns(e, s["conditions"], name)
     matplotlib.pyplot.close("all")
+
+
+def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
+    """summary.json has the first 40: a tow through so many way-points may lose its line after them."""
+    folder = sparse(tmp_path / "a", fields=1) / "members/c001-r001"
+    with h5py.File(folder / "result.h5", "a") as f:
+        f["events/kind_names"] = np.array([b"line_broken", b"adrift", b"waypoint"])
+        f["events/time"], f["events/value"] = np.arange(1.0, 43.0), np.arange(42.0)
+        f["events/kind"], f["events/subject"] = np.array([2] * 40 + [0, 1]), np.array([*range(1, 41), 1, 0])
+    with Run(folder) as run:
+        assert len(run.events) == 42 and run.events[0] == {"time_s": 1, "kind": "waypoint", "subject": 1, "value": 0}
+        assert [v["kind"] for v in run.events[40:]] == ["line_broken", "adrift"] and run.summary["events"] == []
+
+
+BREAKING = 1.5e6  # N
+
+
+def parting(folder, at, second=None, events=True, fields=10):
+    """Ensemble of tows on a line or, with the tension of a second branch as a factor of that of the first, a bridle.
+    at: {member: [(time s, branch)]} at which branches part; the tow force ends with the last of them."""
+    rng, members, n = np.random.default_rng(2), [], 2000
+    time, branches = np.arange(1.0, n + 1), 1 if second is None else 2
+    for k in range(fields):
+        x, broken = made_up.ar1(0.9, n, rng, 1e6, 1e5), dict((b, t) for t, b in at.get(k, []))
+        tensions = {b: np.where(time < broken.get(b, np.inf), f * x, 0) for b, f in ((1, 1.0), (2, second)) if f}
+        for b, t in broken.items():
+            tensions[b][time == t] = 1.1 * BREAKING
+        end = max(broken.values()) if len(broken) == branches else np.inf
+        tow = np.where(time <= end, x, 0)
+        happened = [{"kind": "line_broken", "time_s": t, "subject": b, "value": 1.1 * BREAKING}
+                    for b, t in broken.items()] + [{"kind": "adrift", "time_s": end, "subject": 0, "value": 0.4}
+                                                   for _ in range(int(np.isfinite(end)))]
+        told = {"summary": {"events": happened}} if events else {
+            "warnings": [f"not steady: the last line parted at {end:g} s, and nothing tows the body since"] * (end < n)}
+        series = {"tow_force": tow, "ice_resistance": tow, **{f"line_tension_{b}": x for b, x in tensions.items()}}
+        case = CASE.format(pressure=0, load=BREAKING).replace("line:\n", f"line:\n    branches: {branches}\n")
+        case = case.replace("ice:\n", f"  branch2:\n    breaking_load: {BREAKING / 2} N\nice:\n", 1)
+        members.append(made_up.member(tow, {"ice.concentration": 0.5}, 0, start=301.0, more=series, attributes=SERIES,
+                                      case=case, **told))
+    return made_up.write(folder, members)
+
+
+def warnings_of(s):
+    return [f"{w['what']} ({w['detail']})" for w in s["conditions"][0]["design"]["warnings"]]
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
+    """What comes after is in no number, and the tails of what ends at the breaking load are refused."""
+    s, text = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)], 7: [(1800, 1)]},
+                             events=events))
+    c, first = s["conditions"][0], warnings_of(s)[0]
+    assert first.startswith("tow force and tension are cut off where the line parts, and have no design value")
+    assert "the line parted in 4 of 10 tows, " in first and "the first at 200 s; in 4 of them nothing towed" in first
+    assert "WARNING: Tow force and tension are cut off" in text
+    assert "WARNING: No value (the line parted in 4 of 10 tows)." in text
+    for name in ("tow_force", "line_tension_1", "ice_resistance"):
+        x = c["loads"][name]
+        assert x["fields"] == 8  # two part before the window has five time scales
+        assert x["mean"]["value"] == pytest.approx(1e6, rel=0.02) and x["quantiles"]["5"]["value"] > 8e5
+        assert x["hours"] == pytest.approx((6 * (1700 - 29) + 600 - 29 + 1500 - 29) / 3600)
+        for tail in (x["over_threshold"], x["block_maxima"], x["design"]):
+            assert tail["refused"] == "the line parted in 4 of 10 tows"
+    assert c["design"]["tension"] is None and "value" not in c["design"]["tow"]
+    branch, = c["design"]["branches"]
+    assert branch["largest_step"] == 1.1 * BREAKING and branch["breaking_load"] == BREAKING
+    assert "2 of 10 members" in next(w for w in warnings_of(s) if w.startswith("members without a tow force"))
+
+
+def test_a_branch_that_parts_before_the_window_is_told(tmp_path):
+    """The other one tows on: tow force and ice are those of a tow to the end, the tension is not that of the bridle."""
+    s, _ = of_all(parting(tmp_path / "a", {k: [(100, 1)] for k in range(4)}, second=0.6))
+    c, first = s["conditions"][0], warnings_of(s)[0]
+    assert "the line parted in 4 of 10 tows, branch 1 in 4, the first at 100 s; in 0 of them nothing" in first
+    found = c["loads"]
+    assert {name: found[name]["fields"] for name in found} == {"tow_force": 10, "ice_resistance": 10,
+                                                               "line_tension_1": 6, "line_tension_2": 10}
+    assert all(found[name]["design"]["refused"] == "the line parted in 4 of 10 tows"
+               for name in ("tow_force", "line_tension_1", "line_tension_2"))
+    assert "value" in found["ice_resistance"]["design"]
+
+
+def test_each_branch_has_its_own_breaking_load(tmp_path):
+    """Against its design tension, and against the largest mean of a step, by which it parts."""
+    s, text = of_all(parting(tmp_path / "a", {}, second=0.57))
+    one, two = s["conditions"][0]["design"]["branches"]
+    assert (one["breaking_load"], two["breaking_load"]) == (BREAKING, BREAKING / 2)
+    assert s["conditions"][0]["design"]["breaking_load"] == BREAKING / 2
+    assert two["design"] < BREAKING / 2 < two["largest_step"] and one["largest_step"] < BREAKING
+    said, = [w for w in warnings_of(s) if "above the breaking load" in w]
+    assert said.startswith("the largest mean tension over one step, by which a line parts, is above the breaking load "
+                           "of the line (750 kN of the tension of the second branch, which reaches ")
+    assert "snap loads, which are shorter, are not in it" in text and "breaking load 1500 kN" in text
+
+
+def test_members_without_their_folder_may_have_parted(tmp_path):
+    folder = parting(tmp_path / "a", {}, fields=6)
+    (folder / "members/c001-r002").rename(folder / "elsewhere")
+    s, _ = of_all(folder)
+    assert "whether the line parted is not known of members whose folders are not there (1 of 6 members)" in \
+        warnings_of(s)
 
 
 def test_the_picture_of_return_levels(statement):
