@@ -345,6 +345,10 @@ class Ensemble:
                           sum(int(m) in self._dropped for m in rows)))
         return out
 
+    def tows(self, rows):
+        """Rows of all finished members of the conditions of these, of those that are excluded, too."""
+        return np.flatnonzero(np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED))
+
     def impacts(self, m):
         """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they
         were not told apart, or without a window."""

@@ -113,10 +113,11 @@ def tows_with(e, rows, *kinds):
 
 
 def cut_off(e, rows, load):
-    """Why a load has no tail where lines parted, "" where none did that matters to it."""
-    through_the_line = load.name == ALWAYS[0] or load.applies.startswith(LINE)
-    n = tows_with(e, rows, *[PARTED] * through_the_line, ADRIFT)
-    return f"the line parted in {n} of {len(rows)} tows" if n else ""
+    """Why a load has no tail where lines parted, "" where none did that matters to it. Tows that are excluded count:
+    those that are left are the ones that the line survived."""
+    through_the_line, tows = load.name == ALWAYS[0] or load.applies.startswith(LINE), e.tows(rows)
+    n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
+    return f"the line parted in {n} of {len(tows)} tows" if n else ""
 
 
 def gather(e, rows, options):

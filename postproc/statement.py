@@ -235,29 +235,29 @@ def branches(e, rows, case, found):
 def _of_the_line(e, rows, case, lines):
     """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
     a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
-    out, n = [], len(rows)
-    broken = [v for m in rows for v in e.events(m) or [] if v["kind"] == loads.PARTED]
+    out, tows = [], e.tows(rows)
+    broken = [v for m in tows for v in e.events(m) or [] if v["kind"] == loads.PARTED]
     if broken:
-        adrift = loads.tows_with(e, rows, loads.ADRIFT)
+        parted, adrift = (loads.tows_with(e, tows, kind) for kind in (loads.PARTED, loads.ADRIFT))
         each = [f"branch {k} in {sum(v['subject'] == k for v in broken)}"
                 for k in sorted({v["subject"] for v in broken} - {0})]
         first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
         out.append(("tow force and tension are cut off where the line parts, and have no design value; means and "
                     "largest values are of each tow until nothing tows it, of a tension until its branch parts, and "
                     "are less than those of a line that holds; for a design value simulate without breaking_load",
-                    ", ".join([f"the line parted in {loads.tows_with(e, rows, loads.PARTED)} of {n} tows", *each,
+                    ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
-    unknown = sum(e.events(m) is None for m in rows)
+    unknown = sum(e.events(m) is None for m in tows)
     if unknown and case is not None and case.breaking_loads:
         out.append(("whether the line parted is not known of members whose folders are not there",
-                    f"{unknown} of {n} members"))
-    compared = {"the design tension is": "design"}
-    if not broken:
-        compared["the largest mean tension over one step, by which a line parts, is"] = "largest_step"
-    for words, key in compared.items():
+                    f"{unknown} of {len(tows)} members"))
+    known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # of these it is said above
+    for words, key, some in (("the design tension is", "design", lines),
+                             ("the largest mean tension over one step, by which a line parts, is", "largest_step",
+                              [x for x in lines if x["series"] not in known])):
         above = [f"{quantity(x['breaking_load'], 'N')} of the {x['label']}, which reaches {quantity(x[key], 'N')}"
-                 for x in lines if x[key] > x["breaking_load"]]
+                 for x in some if x[key] > x["breaking_load"]]
         if above:
             out.append((f"{words} above the breaking load of the line", "; ".join(above)))
     return out

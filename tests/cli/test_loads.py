@@ -477,7 +477,7 @@ def parting(folder, at, second=None, events=True, fields=10):
         case = CASE.format(pressure=0, load=BREAKING).replace("line:\n", f"line:\n    branches: {branches}\n")
         case = case.replace("ice:\n", f"  branch2:\n    breaking_load: {BREAKING / 2} N\nice:\n", 1)
         members.append(made_up.member(tow, {"ice.concentration": 0.5}, 0, start=301.0, more=series, attributes=SERIES,
-                                      case=case, **told))
+                                      window={"verdict": "not steady" if end < n else "steady"}, case=case, **told))
     return made_up.write(folder, members)
 
 
@@ -506,6 +506,14 @@ def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
     branch, = c["design"]["branches"]
     assert branch["largest_step"] == 1.1 * BREAKING and branch["breaking_load"] == BREAKING
     assert "2 of 10 members" in next(w for w in warnings_of(s) if w.startswith("members without a tow force"))
+
+
+def test_tows_in_which_the_line_parted_are_not_excluded_without_a_word(tmp_path):
+    """Those that are left are the ones that the line survived, which is no sample of the load."""
+    s, _ = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(400, 1)]}), exclude=["unsteady"])
+    assert s["conditions"][0]["members"]["excluded"] == 2 and "the line parted in 2 of 10 tows" in warnings_of(s)[0]
+    tow = s["conditions"][0]["design"]["tow"]
+    assert tow["fields"] == 8 and tow["refused"] == "the line parted in 2 of 10 tows"
 
 
 def test_a_branch_that_parts_before_the_window_is_told(tmp_path):
