@@ -333,6 +333,18 @@ class Run:
             value = value.get(part) if isinstance(value, dict) else None
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
 
+    @property
+    def events(self):
+        """What happened in the run, in order: [{"time_s", "kind", "subject", "value"}], kinds and numbers as /events of
+        result.h5 has them. summary.json has the first 40; they are taken where the file has none."""
+        def read():
+            if "events/kind_names" not in self._file:
+                return list(self.summary.get("events") or [])
+            names = [_plain(name) for name in self._read("events/kind_names")]
+            rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
+            return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
+        return self._once("events", read)
+
     # ---- case
 
     def _text(self, name):

@@ -73,7 +73,8 @@ def quantile(e, rows, name, share):
         start, end = e.number("window_start_s", m), e.number("window_end_s", m)
         some, time = loads.of_member(e, m)
         for load, x in some:
-            field = stat_load.field_of(time, x, start, end, scale) if load.name == name and np.isfinite(
+            last = min(end, loads.until(e, m, load.name))
+            field = stat_load.field_of(time, x, start, last, scale) if load.name == name and np.isfinite(
                 [start, end]).all() else None
             if field is not None:
                 known, out[k] = load, np.percentile(field["peak"], share)

@@ -63,7 +63,7 @@ def trial(run, number):
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
     return Trial(number, speed,
-                 any(e["kind"] == "line_broken" for e in run.summary.get("events") or []),
+                 any(e["kind"] == "line_broken" for e in run.events),
                  run.number("mean_tow_force_n"), run.number("peak_line_tension_n"), widths, needed)
 
 

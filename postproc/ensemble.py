@@ -133,6 +133,7 @@ def condition(e, c, members, options):
     fields = stat_mean.between_fields(means, errors, options.error)
     values, none, pooled = samples(e, rows, members)
     quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
+    gathered, left_out = loads.gather(e, rows, options)
     out = {
         "index": c.index, "label": c.label, "values": c.values, "units": c.units, "members": {
             "all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
@@ -143,8 +144,8 @@ def condition(e, c, members, options):
         "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
             "independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
             "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
-        }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options),
-        "panels": loads.panels(e, rows)
+        }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
+        "loads_left_out": left_out, "panels": loads.panels(e, rows)
     }
     return out | {"design": statement.statement(e, rows, out)}
 

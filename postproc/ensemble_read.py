@@ -26,6 +26,9 @@ from bergtow_read import Run, RunError
 WAITING, FINISHED, FAILED = 0, 1, 2
 MIN_INDEPENDENT = 20  # samples below which the program itself calls a window short
 
+#: in a warning, from when on nothing tows
+LAST_PARTED = re.compile(r"the last line parted(?: at ([-+.e\d]+) s)?").search
+
 #: kinds of doubt about a member, and what each means
 DOUBTS = {
     "unconverged": "steps met the limit of work before the tolerance",
@@ -107,7 +110,7 @@ class Ensemble:
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})",
                            "run `bergtow ensemble` again: it makes the file anew") from None
-        self._dropped = {}
+        self._dropped, self._events = {}, {}
 
     def _read(self):
         fault = soundness.broken_seal(self.file, "ensemble 1") if soundness.available() else None
@@ -234,6 +237,19 @@ class Ensemble:
         """Warnings of a member in its own words; [] where its folder is not there."""
         return [str(w) for w in self._texts(m).get("warnings") or []]
 
+    def events(self, m):
+        """What happened in a member's run, as Run.events has it; None where its folder is not there. A result without
+        events may say in a warning that its last line parted; where that tells no time, it is -inf."""
+        if int(m) not in self._events:
+            try:
+                with Run(self.folder(m)) as run:
+                    self._events[int(m)] = run.events or [
+                        {"time_s": float(told[1] or -np.inf), "kind": kind, "subject": 0, "value": np.nan}
+                        for told in map(LAST_PARTED, self.texts(m)) if told for kind in ("line_broken", "adrift")]
+            except RunError:
+                self._events[int(m)] = None
+        return self._events[int(m)]
+
     @cached_property
     def _doubts(self):
         out = {}
@@ -328,6 +344,10 @@ class Ensemble:
                           int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)),
                           sum(int(m) in self._dropped for m in rows)))
         return out
+
+    def tows(self, rows):
+        """Rows of all finished members of the conditions of these, of those that are excluded, too."""
+        return np.flatnonzero(np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED))
 
     def impacts(self, m):
         """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they

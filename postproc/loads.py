@@ -8,6 +8,11 @@
 Names, units and labels come from the members' files. All but floe_force are filtered (stat_load.py); that one is local,
 acts for as long as a collision does, and is what it is by impact.conversion, which is named.
 
+A line that parts. The tension of a branch is taken until it parts, all other loads until no branch is left: what comes
+after is no tow, and its zeros would be in every number. Neither tow force nor tension exceeds what the branches bear
+then, and every load ends where it is largest, so where a line parted in any tow there is no tail, and no design value.
+A lower bound in its place was rejected: it stands where a design value stands, and is below the breaking load.
+
 Time scale. 30 s, unless it is given: over so long a time the readings of a bollard pull trial are averaged for the
 largest static pull, while the continuous pull, by which a towing vessel is chosen, is a mean of 10 min [IMO 1998,
 MSC/Circ.884, Guidelines for safe ocean towing]. So a tow force of 30 s is one that the vessel must hold by thrust and
@@ -22,6 +27,7 @@ import stat_extreme
 import stat_load
 import stat_mean
 from bergtow_read import Run, RunError
+from text_table import quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -29,6 +35,10 @@ PROBABILITY = 0.05
 ALWAYS = ("tow_force", "ice_resistance")
 ROLE = "load"
 LOCAL = ("floe_force", "panel_load")  # on a part of the hull
+LINE = "with a tow line"              # what the tension of a branch applies to, alone or with more words
+TENSION = "line_tension_"             # and the number of the branch
+PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
+TAILS = ("over_threshold", "block_maxima")
 
 
 @dataclass(frozen=True)
@@ -90,23 +100,53 @@ def scaling(e, rows):
     return float(np.sqrt(found[0])) if len(found) and np.isfinite(found[0]) and found[0] > 0 else 1.0
 
 
-def _fields(e, rows, time_scale):
-    """{name: (Load, [field, ...])} of a condition, the fields as stat_load.field_of makes them. A load is left out
-    where it is constant, and where members convert its collisions in different ways."""
-    out = {}
+def until(e, m, name):
+    """Time up to which a load of a member is that of a tow, s: a tension until its branch parts, any other load until
+    no branch is left."""
+    return min((v["time_s"] for v in e.events(m) or [] if v["kind"] == ADRIFT
+                or v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"), default=np.inf)
+
+
+def tows_with(e, rows, *kinds):
+    """How many of the members' tows had an event of these kinds."""
+    return sum(any(v["kind"] in kinds for v in e.events(m) or []) for m in rows)
+
+
+def cut_off(e, rows, load):
+    """Why a load has no tail where lines parted, "" where none did that matters to it. Tows that are excluded count:
+    those that are left are the ones that the line survived."""
+    through_the_line, tows = load.name == ALWAYS[0] or load.applies.startswith(LINE), e.tows(rows)
+    n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
+    return f"the line parted in {n} of {len(tows)} tows" if n else ""
+
+
+def gather(e, rows, options):
+    """({name: (Load, [field, ...])}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of makes
+    them, and the loads that are left out: those that are constant over all fields together, and those whose collisions
+    the members convert in different ways. A field in which a load is constant is a field like any other: ice that the
+    tow does not meet is a load of zero, and its hours count. options: time_scale (None: the default)."""
+    out, why = {}, {}
+    time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
     for m in rows:
         start, end = e.number("window_start_s", m), e.number("window_end_s", m)
         some, time = of_member(e, m)
         for load, x in some:
             scale = 0.0 if load.conversion else time_scale
-            field = stat_load.field_of(time, x, start, end, scale) if np.isfinite([start, end]).all() else None
-            if field is not None and np.ptp(field["peak"]) > 0:
+            last = min(end, until(e, m, load.name))
+            field = stat_load.field_of(time, x, start, last, scale) if np.isfinite([start, end]).all() else None
+            if field is not None:
                 out.setdefault(load.name, []).append((load, field | {"member": int(m)}))
-    return {
-        name: (some[0][0], [field for _, field in some])
-        for name, some in out.items()
-        if len({load.conversion for load, _ in some}) == 1
-    }
+    found = {}
+    for name, some in out.items():
+        load, fields = some[0][0], [field for _, field in some]
+        if len({load.conversion for load, _ in some}) > 1:
+            why[name] = {"label": load.label, "why": "members convert its collisions in different ways"}
+        elif stat_load.constant(fields):
+            why[name] = {"label": load.label, "why": f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all "
+                                                     f"{len(fields)} fields"}
+        else:
+            found[name] = load, fields
+    return found, why
 
 
 def _design(found, hours, total):
@@ -120,30 +160,32 @@ def _design(found, hours, total):
                 "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]
             }
     return {
-        "refused": "; ".join(found[kind].get("refused", "no level") for kind in ("over_threshold", "block_maxima")),
+        "refused": "; ".join(dict.fromkeys(found[kind].get("refused", "no level") for kind in TAILS)),
         "return_hours": hours
     }
 
 
-def statistics(e, rows, options):
+def statistics(e, rows, options, gathered=None):
     """{name: all statistics of a load} of the members of a condition; options: time_scale and tow_hours (None: the
-    default), probability, hours, resamples."""
-    shorter = scaling(e, rows)
-    tow_hours = options.tow_hours or TOW_HOURS / shorter
+    default), probability, hours, resamples. gathered: what gather() found, where that is known."""
+    gathered = gather(e, rows, options)[0] if gathered is None else gathered
+    tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
-    for name, (load, fields) in _fields(e, rows, options.time_scale or TIME_SCALE / shorter).items():
+    for name, (load, fields) in gathered.items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
         first = max((f for f in fields if f["start_up"]), key=lambda f: f["start_up"]["largest"], default=None)
         start_up = first and first["start_up"]
         if start_up and name == ALWAYS[0]:
             start_up = start_up | {"inertia": _inertia(e, first["member"], start_up["time_s"], first["scale"])}
-        found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
+        why = cut_off(e, rows, load)
+        found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
+            fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
             "label": load.label, "units": load.units, "description": load.description, "applies": load.applies,
             "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
-            "fields": len(fields), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "fields": len(fields), "members": len(rows), "hours": total, "gap_s": gap, **stat_load.summary(fields),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)

@@ -4,8 +4,9 @@ from itertools import zip_longest
 
 import numpy as np
 
+import stat_load
 import text_table
-from text_table import hours_text, number, pair, scale, table
+from text_table import hours_text, number, pair, quantity, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %
@@ -61,8 +62,20 @@ def design(s, markdown):
         f"{asked(s)}. 95 %: interval over fields, without what the warnings name. * beyond the hours "
         f"simulated: extrapolated by the tail."
     ]
-    notes += [holds_for(s)] if holds_for(s) else []
+    notes += [text for text in (steps(s), holds_for(s)) if text]
     return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+
+
+def steps(s):
+    """What the tensions of single steps reach, which are in no design tension; "" without a line."""
+    found = {}
+    for c in s["conditions"]:
+        for x in c["design"]["branches"]:
+            load = f", breaking load {quantity(x['breaking_load'], 'N')}" if np.isfinite(x["breaking_load"]) else ""
+            found.setdefault(x["label"], []).append(f"{c['label']} {quantity(x['largest_step'], 'N')}{load}")
+    said = [f"{label}: {several(some)}" for label, some in found.items()]
+    return ("A design tension is the same moving mean: snap loads, which are shorter, are not in it. Largest mean over "
+            f"one step, the start included; {'. '.join(said)}.") if said else ""
 
 
 def holds_for(s):
@@ -138,11 +151,29 @@ def signals(s, markdown):
                     f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return "No loads: no member has a window with a towed body."
+        return "\n".join(["No loads: no member has a window with a towed body.", *left_out(s)])
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
-            "that means differ a little from those of the whole window. In the start: the largest before the window, "
-            "which is in no other number. 95 %: interval over fields.")
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
+            "that means differ a little from those of the whole window. In the start: the largest of the means that "
+            "begin before the window, which is in no other number. 95 %: interval over fields.")
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *left_out(s), *conversions(s), *panel_lines(s)])
+
+
+def left_out(s):
+    """Sentences on what is in no number: members without a load, and loads without statistics."""
+    few, why = {}, {}
+    for c in s["conditions"]:
+        lacking = {}
+        for x in c["loads"].values():
+            lacking.setdefault((x["members"] - x["fields"], x["members"]), []).append(x["label"])
+        for (n, all_of_them), labels in lacking.items():
+            if n:
+                few.setdefault(tuple(labels), []).append(f"{c['label']} ({n} of {all_of_them})")
+        for x in c["loads_left_out"].values():
+            why.setdefault((x["label"], x["why"]), []).append(c["label"])
+    return [f"Members without {' and '.join(labels)}, or without a window of {stat_load.LEAST_SCALES} time scales in "
+            f"which they are known throughout, are in no number of these: {several(where)}."
+            for labels, where in few.items()] + [
+                f"{sentence(label)} is left out: {reason}: {several(where)}." for (label, reason), where in why.items()]
 
 
 def estimate(found, factor):

@@ -136,8 +136,8 @@ def answer(e, s, case, results):
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
     if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: of the same moving mean, the largest before the window, which is in no other "
-                     "number.")
+        notes.append("In the start: of the same moving mean, the largest that begins before the window, which is in "
+                     "no other number.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), loads_text.holds_for(s)
@@ -148,6 +148,7 @@ def answer(e, s, case, results):
     out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
     carried = "".join(cell for row in rows for cell in row[1:])
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
+    notes += [loads_text.steps(s)] if loads_text.steps(s) else []
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",

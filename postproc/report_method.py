@@ -117,7 +117,7 @@ def holds(case, s):
         rows.append(("speed made good", "; ".join(f"{label}: {number(v['value'])} m/s" + (
             f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})"
             if np.isfinite(v["interval_95"]).all() else "") for label, v in made)))
-    rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
+    rows.append(("breaking load of the line", case.breaking_words
                  if np.isfinite(case.breaking_load) else "none in the case: the tension above has no safety factor"
                  if case.mode != "speed" else "no line in the case: the tow force above is without dynamics of a line "
                  "and without a safety factor"))

@@ -20,6 +20,10 @@ With fewer fields than that needs, the likelihood alone. Either is a lower bound
 tail itself, and the threshold, are assumed. Below a shape of -1/2 maximum likelihood is irregular
 [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels;
 this is reported.
+
+A load that something limits - a thrust at the bollard pull - stays at its largest value. Such a sample has no tail, and
+is refused in words. Values that differ by rounding alone are the same (TIE): in a moving mean of such a signal they
+differ by some 1e-14 of it, and a tail would be fitted to that.
 """
 import numpy as np
 from scipy import optimize, stats
@@ -33,6 +37,35 @@ SHARE = 0.1          # of the peaks above the threshold, or more, until there ar
 IRREGULAR = -0.5     # shape below which the likelihood is irregular
 EMPTY = 0.05         # share of blocks without a peak above which there is no GEV
 RESAMPLES = 199       # of the p-values
+TIE = 1e-9           # of the largest value: what differs by less is the same
+SATURATED = 0.1      # share of the clusters at one largest value from which on it is a limit, and the excesses no GPD
+
+
+def tie(peak):
+    """What peaks that are the same may differ by."""
+    return TIE * float(np.abs(peak).max(initial=0.0))
+
+
+def exceeds(peak, level):
+    """[n] of bool: is a peak above the level by more than rounding?"""
+    return peak > level + tie(peak)
+
+
+def commonest(values):
+    """(the value that most of these are but for rounding, how many)."""
+    x = np.sort(values)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(x) > tie(x)]))
+    counts = np.diff([*starts, len(x)])
+    k = int(np.argmax(counts))
+    return float(x[starts[k]]), int(counts[k])
+
+
+def saturated(values, what):
+    """Why values are no sample of a tail: SATURATED of them are the largest; "" where not. what: they, in words."""
+    top = values.max(initial=-np.inf)
+    there = int(np.sum(values >= top - tie(values)))
+    return f"saturated at {top:.4g} N, which {there} of {len(values)} {what} reach and none exceeds" \
+        if there > max(1, SATURATED * len(values)) else ""
 
 
 def gpd(excess):
@@ -69,7 +102,7 @@ def gpd(excess):
 
 def clusters(time, peak, threshold, gap):
     """Largest peak of each cluster above the threshold; a cluster ends where none follows within the gap."""
-    above = peak > threshold
+    above = exceeds(peak, threshold)
     t, p = time[above], peak[above]
     if not len(t):
         return p
@@ -103,7 +136,7 @@ def choose_threshold(fields, pooled, gap, clusters_wanted=None):
     clusters; None if there never are. clusters_wanted, for a signal: the highest level with so many, or that with the
     most of them."""
     ordered, wanted = np.sort(pooled)[::-1], clusters_wanted or LEAST_EXCESSES
-    count, best = max(0 if clusters_wanted else int(SHARE * len(pooled)), wanted), (0, None)
+    count, best = max(0 if clusters_wanted else int(SHARE * len(pooled)), wanted), (0, -np.inf)
     while count <= len(pooled) // 2:
         threshold = float(ordered[count])
         found = sum(len(y) for y in _excesses(fields, threshold, gap))
@@ -122,17 +155,20 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
         threshold = choose_threshold(fields, pooled, gap, clusters_wanted)
         if threshold is None:
             return {
-                "refused": f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
+                "refused": saturated(pooled, what) or
+                           f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
                            f"any threshold that half of them exceed at most; run longer, more fields, or a shorter "
                            f"--gap"
             }
     each = _excesses(fields, threshold, gap)
-    excess, raw = np.concatenate(each), int(np.sum(pooled > threshold))
+    excess, raw = np.concatenate(each), sum(int(np.sum(exceeds(f["peak"], threshold))) for f in fields)
     if len(excess) < LEAST_EXCESSES:
         return {
             "refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
                        f"fields, or choose a lower --threshold"
         }
+    if why := saturated(threshold + excess, "clusters"):
+        return {"refused": why}
     scale, shape = gpd(excess)
     levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape,
                                         hours_of_levels)
@@ -251,6 +287,11 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
         return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
     if empty.mean() > EMPTY:
         return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without {what}; lower --blocks, or run longer"}
+    if why := saturated(maxima[~empty], "blocks"):
+        return {"refused": why}
+    value, same = commonest(maxima[~empty])
+    if same > max(1, EMPTY * len(maxima)):
+        return {"refused": f"the largest of {same} of {len(maxima)} blocks is the same, {value:.4g} N: no GEV"}
     total = sum(f["hours"] for f in fields)
     there = [x[np.isfinite(x)] for x in each]
     fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)

@@ -8,7 +8,8 @@ the impulses,
     x_S(t) = (1/S) integral of x from t - S to t,
 which the step no longer decides once S is some steps, and which needs no assumption on how long a collision lasts while
 S is longer than that. The mean does not wait for the filter: its first value stands S after the start of the window, so
-nothing of the start-up is in it.
+nothing of the start-up is in it. All moving means before that one are the start-up, those too that reach from before
+the window into it: a peak across the start of the window is in one of the two.
 
 Fields are independent, samples of a field are not. Means: Student's t over the means of fields. Standard deviation,
 quantiles and rates of all samples together: the jackknife over fields, value +- t se with
@@ -50,7 +51,7 @@ def field_of(time, x, start, end, scale):
     slack = 1e-9 * max(1.0, abs(end))
     before = time < start - slack
     within = ~before & (time <= end + slack)
-    early, time, x = (time[before], x[before]), time[within], x[within]
+    passed, time, x = (time[before], x[before]), time[within], x[within]
     if len(time) < 2 or not np.isfinite(x).all():
         return None
     dt = float(np.median(np.diff(time)))
@@ -58,6 +59,7 @@ def field_of(time, x, start, end, scale):
     if len(x) < LEAST_SCALES * n:
         return None
     y = moving_mean(x, n) if n > 1 else x
+    early = (np.concatenate([some, more[:n - 1]]) for some, more in zip(passed, (time, x)))
     return {
         "time": time[n - 1:], "peak": y if y.ndim == 1 else y.max(axis=1), "start": float(time[n - 1]) - dt,
         "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt, "start_up": start_up(*early, n)
@@ -65,8 +67,9 @@ def field_of(time, x, start, end, scale):
 
 
 def start_up(time, x, n):
-    """The largest mean of n samples in a row before the window, and the time of its last: {"largest", "time_s"}; None
-    where there are not so many, or the load is not there throughout any n of them."""
+    """The largest mean of n samples in a row, and the time of its last: {"largest", "time_s"}; None where there are not
+    so many, or the load is not there throughout any n of them. The samples: those before the window and the first n - 1
+    in it."""
     if len(x) < n:
         return None
     there = np.isfinite(x)
@@ -101,17 +104,24 @@ def ratio_over_fields(counts, sizes):
     return _jackknife(counts.sum() / sizes.sum(), without)
 
 
+def constant(fields):
+    """Is a signal the same in all fields together, but for rounding? What differs between them is none."""
+    peaks = np.concatenate([f["peak"] for f in fields])
+    return bool(np.ptp(peaks) <= stat_extreme.tie(peaks))
+
+
 def gap_of(fields):
-    """Time without exceedance that ends a cluster, s: two correlation times of the fields, a time scale at least."""
-    taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields]
-    return float(max(2 * np.nanmedian(taus), max(f["scale"] for f in fields)))
+    """Time without exceedance that ends a cluster, s: two correlation times of the fields in which the signal changes,
+    a time scale at least."""
+    taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields if not constant([f])]
+    return float(max(2 * np.nanmedian(taus) if taus else 0.0, max(f["scale"] for f in fields)))
 
 
 def exceedance(fields, gap):
     """Rows of level, share of the time above it, and how often an hour it is exceeded, clusters counted once."""
     every, out = np.concatenate([f["peak"] for f in fields]), []
     for level in np.linspace(np.median(every), every.max(), LEVELS + 1)[:-1]:
-        above = [np.sum(f["peak"] > level) for f in fields]
+        above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
         clusters = [len(stat_extreme.clusters(f["time"], f["peak"], level, gap)) for f in fields]
         out.append({
             "level": level, "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields]),

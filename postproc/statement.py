@@ -4,13 +4,14 @@ tow of stated length, its interval over fields, what it holds for, and what spea
 
     p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
 Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
-domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a start-up, which no number
-holds, that takes more than the value.
+domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a start-up,
+which no number holds, that takes more than the value.
 """
 from dataclasses import dataclass
 
 import numpy as np
 
+import loads
 import stat_load
 import stat_mean
 import stat_profile
@@ -28,7 +29,6 @@ DOUBTFUL = {
     "unsteady": "members whose loads still change within the window",
     "short": "members with fewer than 20 independent samples", "stopped": "members that stopped early"
 }
-LINE = "with a tow line"  #: what the tension of a branch applies to, alone or with more words
 #: what stands in the line of what the values hold for: case key, words in front and behind
 HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
              ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
@@ -45,10 +45,27 @@ class Case:
 
     rigid: bool            #: nothing limits the force of a floe
     mode: str
-    breaking_load: float   #: N, NaN without one
+    breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that part
     bollard_pull: float    #: N, NaN without a vessel
     ramp: float            #: s, over which the tow is brought to its speed
     texts: dict            #: {key: value as written}
+
+    @property
+    def breaking_load(self):
+        """That of the weaker branch, N; NaN where none parts."""
+        return min(self.breaking_loads.values(), default=np.nan)
+
+    @property
+    def breaking_words(self):
+        """"150 kN", of a bridle "150 kN of branch 1, 120 kN of branch 2"; "" where none parts."""
+        found = {name[len(loads.TENSION):]: quantity(load, "N") for name, load in self.breaking_loads.items()}
+        return found["1"] if list(found) == ["1"] else ", ".join(f"{load} of branch {k}" for k, load in found.items())
+
+
+def _breaking_loads(run, mode):
+    keys = ("tow.line.breaking_load", "tow.branch2.breaking_load")[:int(run.value("tow.line.branches", 1.0))]
+    found = {f"{loads.TENSION}{k + 1}": run.value(key, 0.0) for k, key in enumerate(keys)}
+    return {name: load for name, load in found.items() if load > 0 and mode != "speed"}
 
 
 def case_of(e, rows):
@@ -57,9 +74,8 @@ def case_of(e, rows):
         try:
             with Run(e.folder(m)) as run:
                 limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
-                load, pull = run.value("tow.line.breaking_load", 0.0), run.value("tow.vessel.bollard_pull", 0.0)
-                mode = run.case.get("tow.mode", "")
-                return Case(not any(x > 0 for x in limits), mode, load if load > 0 and mode != "speed" else np.nan,
+                mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
+                return Case(not any(x > 0 for x in limits), mode, _breaking_loads(run, mode),
                             pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0), run.case)
         except RunError:
             continue
@@ -133,6 +149,10 @@ def _of_the_sample(e, rows, c, load):
             out.append((words, f"{n} of {len(rows)} members"))
     if c["drift"]["verdict"] == "not steady":
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
+    if load["fields"] < load["members"]:
+        out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
+                    "in which it is known throughout, are in no number of it",
+                    f"{load['members'] - load['fields']} of {load['members']} members"))
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
                     f"{load['fields']}"))
@@ -179,6 +199,70 @@ def _of_the_start(case, load):
     return [(f"the start, which is left out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
 
 
+def steps(e, rows):
+    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}).
+    Without a second branch the numbers of the summary are in it, which know the steps between samples and members
+    without their folder."""
+    out, labels = {}, {}
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                for name in [n for n in run.series_names if n.startswith(loads.TENSION)]:
+                    out[name] = np.fmax(out.get(name, np.nan), np.fmax.reduce(run[name], initial=-np.inf))
+                    labels[name] = run.label(name)
+        except RunError:
+            continue
+    out = {name: top for name, top in out.items() if np.isfinite(top)}
+    numbers = np.concatenate([_numbers(e, key, rows) for key in ("peak_line_tension_n", "start_peak_line_tension_n")])
+    top, first = np.fmax.reduce(numbers, initial=-np.inf), f"{loads.TENSION}1"
+    if np.isfinite(top) and set(out) <= {first}:
+        out[first] = max(top, out.get(first, top))
+    return out, labels
+
+
+def branches(e, rows, case, found):
+    """Of each branch of the line its breaking load (NaN: none), the largest tension of a step, start included, and the
+    design tension (NaN: none), N. found: statistics of the loads."""
+    largest, labels = steps(e, rows)
+    def row(name):
+        load = found.get(name)
+        return {"series": name, "label": labels.get(name, "line tension"), "largest_step": largest[name],
+                "breaking_load": case.breaking_loads.get(name, np.nan) if case else np.nan,
+                "design": load["design"].get("value", np.nan) if load else np.nan}
+    return [row(name) for name in sorted(largest)]
+
+
+def _of_the_line(e, rows, case, lines):
+    """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
+    a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
+    out, tows = [], e.tows(rows)
+    broken = [v for m in tows for v in e.events(m) or [] if v["kind"] == loads.PARTED]
+    if broken:
+        parted, adrift = (loads.tows_with(e, tows, kind) for kind in (loads.PARTED, loads.ADRIFT))
+        each = [f"branch {k} in {sum(v['subject'] == k for v in broken)}"
+                for k in sorted({v["subject"] for v in broken} - {0})]
+        first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
+        out.append(("tow force and tension are cut off where the line parts, and have no design value; means and "
+                    "largest values are of each tow until nothing tows it, of a tension until its branch parts, and "
+                    "are less than those of a line that holds; for a design value simulate without breaking_load",
+                    ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
+                               *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
+                    + f"; in {adrift} of them nothing towed the body then"))
+    unknown = sum(e.events(m) is None for m in tows)
+    if unknown and case is not None and case.breaking_loads:
+        out.append(("whether the line parted is not known of members whose folders are not there",
+                    f"{unknown} of {len(tows)} members"))
+    known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # of these it is said above
+    for words, key, some in (("the design tension is", "design", lines),
+                             ("the largest mean tension over one step, by which a line parts, is", "largest_step",
+                              [x for x in lines if x["series"] not in known])):
+        above = [f"{quantity(x['breaking_load'], 'N')} of the {x['label']}, which reaches {quantity(x[key], 'N')}"
+                 for x in some if x[key] > x["breaking_load"]]
+        if above:
+            out.append((f"{words} above the breaking load of the line", "; ".join(above)))
+    return out
+
+
 def _of_the_models(load):
     """Do the two models of the tail agree?"""
     over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
@@ -192,22 +276,22 @@ def _of_the_models(load):
 
 
 def statement(e, rows, c):
-    """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "warnings",
-    "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
-    case, loads = case_of(e, rows), c["loads"]
-    tow = loads.get("tow_force")
-    tensions = [(load["design"], load) for load in loads.values()
-                if load["applies"].startswith(LINE) and "value" in load["design"]]
+    """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "branches",
+    "warnings", "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
+    case, found = case_of(e, rows), c["loads"]
+    tow, lines = found.get("tow_force"), branches(e, rows, case, found)
+    tensions = [(load["design"], load) for load in found.values()
+                if load["applies"].startswith(loads.LINE) and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if tow is None:
-        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+        left = c["loads_left_out"].get("tow_force")
+        warned.append(("no tow force that varies", left["why"]) if left else
+                      (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
-    breaking = case.breaking_load if case else np.nan
-    if worst and worst[0]["value"] > breaking:
-        warned.append(("the tension is above the breaking load of the line", quantity(breaking, "N")))
+    warned = _of_the_line(e, rows, case, lines) + warned
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
@@ -215,7 +299,8 @@ def statement(e, rows, c):
                         "largest": tow["largest"], "start_up": tow["start_up"]},
         "speed": speed_made_good(e, rows),
         "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"]},
-        "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
+        "warnings": [{"what": what, "detail": detail} for what, detail in warned], "branches": lines,
+        "breaking_load": case.breaking_load if case else np.nan,
         "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
     }
 

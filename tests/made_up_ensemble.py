@@ -49,7 +49,7 @@ def numbers(m):
         for name, f in m["estimates"].items()
     }
     return {
-        "mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0,
+        "mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "events": [],
         "stalled_windows": 0, "concentration": 0.5, "window": {
             "start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0,
             "correlation_time_s": 1.0

@@ -223,7 +223,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
 class made_up_run:
     """A run whose body keeps 0.15 m/s below a concentration of 0.5, and stops above."""
 
-    window, case, summary = (0.0, 10.0), {}, {}
+    window, case, summary, events = (0.0, 10.0), {}, {}, []
     speed_made_good = Run.speed_made_good
 
     def __init__(self, path):

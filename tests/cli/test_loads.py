@@ -6,6 +6,7 @@ import json
 import sys
 from pathlib import Path
 
+import h5py
 import matplotlib
 import numpy as np
 import pytest
@@ -17,13 +18,17 @@ from test_postproc import script
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
+import ensemble  # noqa: E402
+import ensemble_text  # noqa: E402
 import loads  # noqa: E402
 import loads_text  # noqa: E402
 import plot_ensemble  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
 import statement as statement_module  # noqa: E402
+from bergtow_read import Run  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
+from report_ensemble import OPTIONS  # noqa: E402
 
 TRIALS = 14
 
@@ -45,14 +50,29 @@ def test_the_filter_by_hand():
 
 
 def test_the_start_is_what_lies_before_the_window():
-    """Means over the same time that end before the window; where the load is not there they are passed over."""
+    """Means over the same time that begin before the window; where the load is not there they are passed over."""
     time, x = np.arange(1.0, 15.0), np.array([np.nan, 5, 9, 1, 50, 50, 0, 0, 0, 0, 0, 0, 0, 0])
     assert stat_load.field_of(time, x, 5.0, 14.0, 1.0)["start_up"] == {"largest": 9, "time_s": 3}
-    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
-    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] is None  # one sample is no mean of two
+    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 25.5, "time_s": 5}
+    assert stat_load.field_of(time, x, 4.0, 13.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
+    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] == {"largest": 0, "time_s": 2}
+    assert stat_load.field_of(time, x[::-1], 1.0, 13.0, 2.0)["start_up"] is None  # the first mean is that of the window
     assert stat_load.start_up(time[:2], np.full(2, np.nan), 1) is None
     panels = np.array([[4.0, 0, 4], [1.0, 7, 1]]).T
     assert stat_load.start_up(time[:3], panels, 2) == {"largest": 4, "time_s": 2}
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 7.0, 30.0])
+def test_every_mean_is_in_the_window_or_in_the_start(scale):
+    """A peak across the start of the window is in no mean that begins in it."""
+    time, x = np.arange(1.0, 401.0), np.random.default_rng(0).normal(100, 1, 400)
+    x[85:115] = 500
+    for start in (80.0, 95.0, 100.0, 115.0, 130.0):
+        f = stat_load.field_of(time, x, start, 400.0, scale)
+        every = stat_load.moving_mean(x, int(scale))
+        assert max(f["start_up"]["largest"], f["peak"].max()) == pytest.approx(every.max(), rel=1e-12)
+        assert f["start_up"]["time_s"] < f["time"][0]
+        assert len(f["peak"]) + np.sum(time[int(scale) - 1:] < f["time"][0]) == len(every)
 
 
 def test_the_filter_leaves_impulses_alone():
@@ -128,6 +148,42 @@ def test_a_correlated_signal_of_few_clusters_has_no_tail():
     found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)
     assert "samples do not make 30 clusters" in found["over_threshold"]["refused"]
     assert "run longer" in found["block_maxima"]["refused"]
+
+
+def saturated_fields(cap, time_scale, at, fields=8, n=3600):
+    """AR(1) of 0.99 about 90 % of a cap, which its values do not exceed; at: share of an sd where the cap is."""
+    rng, time = np.random.default_rng(1), np.arange(1.0, n + 1)
+    return [stat_load.field_of(time, cap * np.minimum(1 + 0.3 * (made_up.ar1(0.99, n, rng) - at), 1.0), 1.0, n,
+                               time_scale) for _ in range(fields)]
+
+
+@pytest.mark.parametrize("cap, time_scale, at", [(1.0, 1.0, -0.5), (1e6, 30.0, -2.0), (1e6, 30.0, 0.3),
+                                                 (2 ** 20, 1.0, 0.3), (1e6, 1.0, 1.0)])
+def test_a_saturated_load_has_no_tail(cap, time_scale, at):
+    """Most of the time at the cap, where no sample is above another, or the maxima of the clusters at it."""
+    fields = saturated_fields(cap, time_scale, at)
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0, 468.0], 1)
+    assert f"saturated at {cap:.4g} N" in found["over_threshold"]["refused"]
+    assert "refused" in found["block_maxima"]
+
+
+def test_a_cap_that_is_hardly_ever_reached_is_no_saturation():
+    fields = saturated_fields(1e6, 1.0, 2.9)
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)
+    assert "refused" not in found["over_threshold"]
+
+
+def test_values_that_differ_by_rounding_are_the_same():
+    noise = 1e-15 * np.arange(5)
+    assert stat_extreme.commonest(np.array([*(1 + noise), 0.0, 0.0, 2.0])) == (1.0, 5)
+    assert not stat_extreme.exceeds(1e6 * (1 + noise), 1e6).any() and stat_extreme.exceeds(np.array([1.001]), 1.0).all()
+    assert stat_extreme.saturated(1e6 * (1 + noise), "blocks") == \
+        "saturated at 1e+06 N, which 5 of 5 blocks reach and none exceeds"
+    assert stat_extreme.saturated(np.arange(50.0), "blocks") == stat_extreme.saturated(np.zeros(0), "blocks") == ""
+    time, peak = np.arange(1.0, 1001.0), np.where(np.arange(1000) < 700, 0.0, np.arange(1000.0))
+    field = {"time": time, "peak": peak, "start": 0.0, "hours": 1000 / 3600}
+    assert stat_extreme.by_blocks([field], [1.0], 40)["refused"] == \
+        "the largest of 28 of 40 blocks is the same, 0 N: no GEV"
 
 
 # ---- ensembles
@@ -287,7 +343,11 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
     found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
-    assert "no upper bound" not in found and "above the breaking load of the line: concentration 90 % (2.00 MN" in found
+    assert "no upper bound" not in found
+    above = "above the breaking load of the line"
+    assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
+    # in the start
+    assert f"step, by which a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 MN)" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):
@@ -309,6 +369,185 @@ def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):
     e = Ensemble(folder)
     found = loads.statistics(e, e.conditions()[0].finished, options())
     assert found["tow_force"]["fields"] == 6 and found["line_tension_1"]["fields"] == 5
+
+
+SPARSE = 3000  # samples of a field
+
+
+def sparse(folder, fields=10, meet=4, n=SPARSE, changes=None):
+    """Ensemble of ice so sparse that `meet` of the fields meet any floe; the drag is constant, the thrust saturated.
+    changes: {member: what made_up.member takes}."""
+    rng, members = np.random.default_rng(1), []
+    for k in range(fields):
+        x = np.zeros(n)
+        for at in rng.integers(60, n - 100, 16 if k < meet else 0):
+            x[at:at + 40] += rng.exponential(1000)
+        thrust = np.minimum(9e5 + 3e5 * made_up.ar1(0.98, n, rng), 1e6)
+        series = {"tow_force": x, "ice_resistance": x, "line_tension_1": np.full(n, 1234.567), "vessel_thrust": thrust}
+        members.append(made_up.member(x, {"ice.concentration": 0.1}, 0, attributes=SERIES,
+                                      **{"more": series} | (changes or {}).get(k, {})))
+    return made_up.write(folder, members)
+
+
+def of_all(folder, **changes):
+    """statistics.json of a folder as a dict, and its tables."""
+    s = ensemble.statistics(Ensemble(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
+    return s, ensemble_text.report(s, False)
+
+
+def test_fields_that_meet_no_ice_are_fields(tmp_path):
+    """Their zeros and their hours count: the mean is that of all fields, and so is the rate."""
+    s, text = of_all(sparse(tmp_path / "a"))
+    c, = s["conditions"]
+    for name in ("tow_force", "ice_resistance"):
+        x = c["loads"][name]
+        assert x["fields"] == x["members"] == 10 and x["hours"] == pytest.approx(10 * (SPARSE - 29) / 3600)
+        assert x["mean"]["value"] == pytest.approx(c["resistance"]["mean"], rel=0.03)  # less the window's first 30 s
+        assert x["over_threshold"]["rate_per_hour"] == pytest.approx(x["over_threshold"]["clusters"] / x["hours"])
+        assert "blocks is the same, 0 N" in x["block_maxima"]["refused"]
+    assert "Members without" not in text
+
+
+def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
+    few = {"more": {"tow_force": np.where(np.arange(SPARSE) == 999, np.nan, 1.0)}}
+    s, text = of_all(sparse(tmp_path / "a", changes={0: few, 9: few, 5: {"window": {"start_s": SPARSE - 100.0}}}))
+    c, = s["conditions"]
+    x = c["loads"]["tow_force"]
+    assert x["fields"] == 7 and x["members"] == 10
+    assert ("members without a tow force, or without a window of 5 time scales in which it is known throughout, are in "
+            "no number of it", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
+    assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
+        "which they are known throughout, are in no number of these: concentration 10 % (3 of 10)." in text
+    # a moving mean leaves 2e-10 N of a constant
+    assert "Line tension is left out: constant, 1230 N, in all 7 fields: concentration 10 %." in text
+    assert c["loads_left_out"]["line_tension_1"]["label"] == "line tension"
+
+
+def test_a_constant_tow_force_is_named(tmp_path):
+    _, text = of_all(sparse(tmp_path / "a", meet=0, fields=3))
+    assert "No design tow force. WARNING: No tow force that varies (constant, 0 N, in all 3 fields)." in text
+
+
+def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
+    s, text = of_all(sparse(tmp_path / "a"))
+    thrust = s["conditions"][0]["loads"]["vessel_thrust"]
+    assert "saturated at 1e+06 N" in thrust["over_threshold"]["refused"] and "value" not in thrust["design"]
+    assert "saturated at 1e+06 N" in text and thrust["largest"] == pytest.approx(1e6)
+    ensemble.write(s, tmp_path, False)
+    e = Ensemble(tmp_path / "a")
+    for name in ("tow_force", "vessel_thrust"):
+        plot_ensemble.draw_above(e, s["conditions"], name)
+        plot_ensemble.draw_returns(e, s["conditions"], name)
+    matplotlib.pyplot.close("all")
+
+
+def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
+    """summary.json has the first 40: a tow through so many way-points may lose its line after them."""
+    folder = sparse(tmp_path / "a", fields=1) / "members/c001-r001"
+    with h5py.File(folder / "result.h5", "a") as f:
+        f["events/kind_names"] = np.array([b"line_broken", b"adrift", b"waypoint"])
+        f["events/time"], f["events/value"] = np.arange(1.0, 43.0), np.arange(42.0)
+        f["events/kind"], f["events/subject"] = np.array([2] * 40 + [0, 1]), np.array([*range(1, 41), 1, 0])
+    with Run(folder) as run:
+        assert len(run.events) == 42 and run.events[0] == {"time_s": 1, "kind": "waypoint", "subject": 1, "value": 0}
+        assert [v["kind"] for v in run.events[40:]] == ["line_broken", "adrift"] and run.summary["events"] == []
+
+
+BREAKING = 1.5e6  # N
+
+
+def parting(folder, at, second=None, events=True, fields=10):
+    """Ensemble of tows on a line or, with the tension of a second branch as a factor of that of the first, a bridle.
+    at: {member: [(time s, branch)]} at which branches part; the tow force ends with the last of them."""
+    rng, members, n = np.random.default_rng(2), [], 2000
+    time, branches = np.arange(1.0, n + 1), 1 if second is None else 2
+    for k in range(fields):
+        x, broken = made_up.ar1(0.9, n, rng, 1e6, 1e5), dict((b, t) for t, b in at.get(k, []))
+        tensions = {b: np.where(time < broken.get(b, np.inf), f * x, 0) for b, f in ((1, 1.0), (2, second)) if f}
+        for b, t in broken.items():
+            tensions[b][time == t] = 1.1 * BREAKING
+        end = max(broken.values()) if len(broken) == branches else np.inf
+        tow = np.where(time <= end, x, 0)
+        happened = [{"kind": "line_broken", "time_s": t, "subject": b, "value": 1.1 * BREAKING}
+                    for b, t in broken.items()] + [{"kind": "adrift", "time_s": end, "subject": 0, "value": 0.4}
+                                                   for _ in range(int(np.isfinite(end)))]
+        told = {"summary": {"events": happened}} if events else {
+            "warnings": [f"not steady: the last line parted at {end:g} s, and nothing tows the body since"] * (end < n)}
+        series = {"tow_force": tow, "ice_resistance": tow, **{f"line_tension_{b}": x for b, x in tensions.items()}}
+        case = CASE.format(pressure=0, load=BREAKING).replace("line:\n", f"line:\n    branches: {branches}\n")
+        case = case.replace("ice:\n", f"  branch2:\n    breaking_load: {BREAKING / 2} N\nice:\n", 1)
+        members.append(made_up.member(tow, {"ice.concentration": 0.5}, 0, start=301.0, more=series, attributes=SERIES,
+                                      window={"verdict": "not steady" if end < n else "steady"}, case=case, **told))
+    return made_up.write(folder, members)
+
+
+def warnings_of(s):
+    return [f"{w['what']} ({w['detail']})" for w in s["conditions"][0]["design"]["warnings"]]
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
+    """What comes after is in no number, and the tails of what ends at the breaking load are refused."""
+    s, text = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)], 7: [(1800, 1)]},
+                             events=events))
+    c, first = s["conditions"][0], warnings_of(s)[0]
+    assert first.startswith("tow force and tension are cut off where the line parts, and have no design value")
+    assert "the line parted in 4 of 10 tows, " in first and "the first at 200 s; in 4 of them nothing towed" in first
+    assert "WARNING: Tow force and tension are cut off" in text
+    assert "WARNING: No value (the line parted in 4 of 10 tows)." in text
+    for name in ("tow_force", "line_tension_1", "ice_resistance"):
+        x = c["loads"][name]
+        assert x["fields"] == 8  # two part before the window has five time scales
+        assert x["mean"]["value"] == pytest.approx(1e6, rel=0.02) and x["quantiles"]["5"]["value"] > 8e5
+        assert x["hours"] == pytest.approx((6 * (1700 - 29) + 600 - 29 + 1500 - 29) / 3600)
+        for tail in (x["over_threshold"], x["block_maxima"], x["design"]):
+            assert tail["refused"] == "the line parted in 4 of 10 tows"
+    assert c["design"]["tension"] is None and "value" not in c["design"]["tow"]
+    branch, = c["design"]["branches"]
+    assert branch["largest_step"] == 1.1 * BREAKING and branch["breaking_load"] == BREAKING
+    assert "2 of 10 members" in next(w for w in warnings_of(s) if w.startswith("members without a tow force"))
+
+
+def test_tows_in_which_the_line_parted_are_not_excluded_without_a_word(tmp_path):
+    """Those that are left are the ones that the line survived, which is no sample of the load."""
+    s, _ = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(400, 1)]}), exclude=["unsteady"])
+    assert s["conditions"][0]["members"]["excluded"] == 2 and "the line parted in 2 of 10 tows" in warnings_of(s)[0]
+    tow = s["conditions"][0]["design"]["tow"]
+    assert tow["fields"] == 8 and tow["refused"] == "the line parted in 2 of 10 tows"
+
+
+def test_a_branch_that_parts_before_the_window_is_told(tmp_path):
+    """The other one tows on: tow force and ice are those of a tow to the end, the tension is not that of the bridle."""
+    s, _ = of_all(parting(tmp_path / "a", {k: [(100, 1)] for k in range(4)}, second=0.6))
+    c, first = s["conditions"][0], warnings_of(s)[0]
+    assert "the line parted in 4 of 10 tows, branch 1 in 4, the first at 100 s; in 0 of them nothing" in first
+    found = c["loads"]
+    assert {name: found[name]["fields"] for name in found} == {"tow_force": 10, "ice_resistance": 10,
+                                                               "line_tension_1": 6, "line_tension_2": 10}
+    assert all(found[name]["design"]["refused"] == "the line parted in 4 of 10 tows"
+               for name in ("tow_force", "line_tension_1", "line_tension_2"))
+    assert "value" in found["ice_resistance"]["design"]
+
+
+def test_each_branch_has_its_own_breaking_load(tmp_path):
+    """Against its design tension, and against the largest mean of a step, by which it parts."""
+    s, text = of_all(parting(tmp_path / "a", {}, second=0.57))
+    one, two = s["conditions"][0]["design"]["branches"]
+    assert (one["breaking_load"], two["breaking_load"]) == (BREAKING, BREAKING / 2)
+    assert s["conditions"][0]["design"]["breaking_load"] == BREAKING / 2
+    assert two["design"] < BREAKING / 2 < two["largest_step"] and one["largest_step"] < BREAKING
+    said, = [w for w in warnings_of(s) if "above the breaking load" in w]
+    assert said.startswith("the largest mean tension over one step, by which a line parts, is above the breaking load "
+                           "of the line (750 kN of the tension of the second branch, which reaches ")
+    assert "snap loads, which are shorter, are not in it" in text and "breaking load 1500 kN" in text
+
+
+def test_members_without_their_folder_may_have_parted(tmp_path):
+    folder = parting(tmp_path / "a", {}, fields=6)
+    (folder / "members/c001-r002").rename(folder / "elsewhere")
+    s, _ = of_all(folder)
+    assert "whether the line parted is not known of members whose folders are not there (1 of 6 members)" in \
+        warnings_of(s)
 
 
 def test_the_picture_of_return_levels(statement):

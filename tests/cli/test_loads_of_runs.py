@@ -96,6 +96,30 @@ def test_what_inertia_takes_of_the_start(towed):
     assert len({round(v, 6) for v in found.values()}) > 1  # or any member's would do
 
 
+def test_a_bridle_that_loses_a_branch_before_the_window(tmp_path):
+    """Its window may be steady, and no number but the list of events tells it."""
+    case = changed(VESSEL, tow__line={"branches": 2, "breaking_load": 0}, tow__branch2={"breaking_load": 120})
+    write_case(tmp_path, case, "base.yml")
+    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": N}))
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
+    e = Ensemble(tmp_path / "out")
+    for m in range(N):
+        broken, = e.events(m)
+        assert broken["kind"] == "line_broken" and broken["subject"] == 2 and broken["value"] > 120
+        assert broken["time_s"] < e.number("window_start_s", m)
+        assert json.loads((e.folder(m) / "summary.json").read_text())["events"] == [broken]
+    s = ensemble.statistics(e, argparse.Namespace(**report_ensemble.OPTIONS | {"resamples": 1, "hours": [0.005]}))
+    c, = s["conditions"]
+    assert f"the line parted in {N} of {N} tows, branch 2 in {N}, the first at" in c["design"]["warnings"][0]["detail"]
+    assert c["design"]["tow"]["refused"] == f"the line parted in {N} of {N} tows"
+    assert c["loads"]["tow_force"]["fields"] == N
+    one, two = c["design"]["branches"]
+    assert np.isnan(one["breaking_load"]) and two["breaking_load"] == 120 < two["largest_step"] < one["largest_step"]
+    assert two["label"] == "tension of the second branch"
+    rows = dict(report_method.holds(statement.case_of(e, e.used), s))
+    assert rows["breaking load of the line"] == "120 N of branch 2"
+
+
 def test_tables_pictures_and_answer_have_them(towed):
     e, s = towed
     labels = {x["label"] for x in s["conditions"][0]["loads"].values()}
