@@ -151,7 +151,7 @@ def answer(e, s, case, results):
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(case, s) + report_method.beyond(results)}] if case else []
+             "rows": report_method.holds(case, s) + report_method.beyond(results, e)}] if case else []
     return out + [lines(held)] * bool(held)
 
 

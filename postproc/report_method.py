@@ -4,6 +4,7 @@ from what was simulated."""
 import numpy as np
 
 import capability_text
+import compared
 import loads_text
 import stat_extreme
 import stat_profile
@@ -141,22 +142,24 @@ def _capability(found):
                f"{number(found['speed'])} m/s{name}", at)
 
 
-def _convergence(found):
-    """What converge.json says in one line: what matters, what does not, what stayed open."""
-    rows = [r for r in found["rows"] if r["name"] != "fields"]
-    by = {judged: list(dict.fromkeys(r["name"] for r in rows if r["judged"] == judged))
-          for judged in ("matters", "open", "none")}
-    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"))
-    return "; ".join(f"{said} {', '.join(by[judged])}" for judged, said in words if by[judged]) or "nothing compared"
+def _convergence(found, own):
+    """What converge.json says in one line of the values that the case has: what matters, what does not, what stayed
+    open, what was compared at another value alone. A quantity has one verdict: of 2 s against 1 s, if 2 s is the time
+    step of the case, and not that of 1 s against 0.5 s as well."""
+    verdicts = compared.verdicts(found["rows"], own)
+    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
+             ("elsewhere", "not compared at the value of these tows:"))
+    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
+    return "; ".join(f"{said} {', '.join(names)}" for said, names in some if names) or "nothing compared"
 
 
-def beyond(results):
-    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py."""
+def beyond(results, e):
+    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
-                 else _convergence(converge)))
+                 else _convergence(converge, compared.values(e, compared.cases(e)))))
     return rows + list(_capability(results["capability"]) if "capability" in results else [])
