@@ -2,8 +2,8 @@
 """What converge.json says of another study: of the value of each quantity that this study itself runs with, and not of
 any other that was tried.
 
-A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends. So
-what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
+A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
+So what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
 """
 import numpy as np
 

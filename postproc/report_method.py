@@ -142,11 +142,14 @@ def _capability(found):
                f"{number(found['speed'])} m/s{name}", at)
 
 
-def _convergence(found, own):
+def _convergence(found, e):
     """What converge.json says in one line of the values that the case has: what matters, what does not, what stayed
     open, what was compared at another value alone. A quantity has one verdict: of 2 s against 1 s, if 2 s is the time
     step of the case, and not that of 1 s against 0.5 s as well."""
-    verdicts = compared.verdicts(found["rows"], own)
+    texts = compared.cases(e)
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    verdicts = compared.verdicts(found["rows"], compared.values(e, texts))
     words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
              ("elsewhere", "not compared at the value of these tows:"))
     some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
@@ -161,5 +164,5 @@ def beyond(results, e):
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
-                 else _convergence(converge, compared.values(e, compared.cases(e)))))
+                 else _convergence(converge, e)))
     return rows + list(_capability(results["capability"]) if "capability" in results else [])
