@@ -30,7 +30,9 @@ def asked(s):
 
 
 def value(d, factor):
-    return "–" if "refused" in d else number(d["value"] / factor) + ("*" if d["beyond_data"] else "")
+    if "refused" in d:
+        return "–"
+    return number(text_table.designed(d["value"], d["largest"]) / factor) + ("*" if d["beyond_data"] else "")
 
 
 def ends(d, factor):
