@@ -6,6 +6,7 @@ import numpy as np
 import capability_text
 import compared
 import loads_text
+import stat_alike
 import stat_extreme
 import stat_profile
 from text_table import number, quantity
@@ -56,7 +57,9 @@ def method(s, case):
         "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
         "95 % intervals come from the profile "
         f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on; each condition "
-        "is fitted by itself, so their ends need not rise with the concentration. At least "
+        "is fitted by itself, so their ends need not rise with the concentration. They hold for fields that are alike: "
+        f"a test at {100 * stat_alike.LEVEL:g} % of the maxima of blocks, by their ranks, warns of conditions whose "
+        "fields differ by more than chance. At least "
         f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are required; otherwise there "
         "is no value.")
     if any(c["design"]["tension"] for c in s["conditions"]):
@@ -102,8 +105,10 @@ def limits(case, jams):
         out.append("No vessel is judged: the case names no bollard pull.")
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
-    out.append("The intervals cover the scatter of the fields and the error of the fit. They cover neither the values "
-               "that are assumed nor the choice of the model, and there is no safety factor in any number.")
+    out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
+               "in level, return levels and the design value are borne by fields worse than any simulated, and lie "
+               "above the interval more often than it says. The intervals cover neither the values that are assumed "
+               "nor the choice of the model, and there is no safety factor in any number.")
     return out
 
 
