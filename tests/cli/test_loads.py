@@ -108,6 +108,16 @@ def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
 
 # ---- fields that are not alike
 
+def test_levels_of_fields_that_differ():
+    """Of no difference those of the process; of a scale of each field, what simulated years have."""
+    same, unlike = UNLIKE(0.9, 0.0), UNLIKE(0.9, 0.5)
+    assert same.level(10.0) == pytest.approx(AR1(0.9).level(10.0), rel=1e-3)
+    z = unlike.level(1.0)
+    x = unlike.sample(2000, 3600, np.random.default_rng(6))
+    found = [len(stat_extreme.clusters(np.arange(3600.0), y, z, 40.0)) for y in x]
+    assert np.mean(found) == pytest.approx(1.0, abs=4 * stats.sem(found))
+
+
 SETS = 200
 
 

@@ -30,8 +30,8 @@ def test_intervals_hold_the_levels(process, fields, n):
 
 @pytest.mark.parametrize("process, fields, n", UNLIKE_STUDIES, ids=lambda v: getattr(v, "name", None))
 def test_what_intervals_hold_where_fields_differ(process, fields, n):
-    """Measured, and not 95 %: levels of more hours than were simulated are borne by fields worse than any drawn. Held
-    against a half alone, so that a table of nonsense is found."""
+    """Measured, and not 95 %: levels of more hours than were simulated are borne by fields worse than any drawn. From
+    the hours simulated on, held against a half alone, so that a table of nonsense is found."""
     for kind, (inside, ratio) in coverage(process, fields, n, UNLIKE_TRIALS, TIMES, seed=1).items():
         print(row(process, fields, n, kind, inside, ratio, UNLIKE_TRIALS))
-        assert min(inside) >= 0.5 * UNLIKE_TRIALS, (kind, inside)
+        assert min(inside[1:]) >= 0.5 * UNLIKE_TRIALS, (kind, inside)
