@@ -147,7 +147,8 @@ def budget(parameters, condition, y, numerics=None):
     out["together"] = {"sd": float(np.sqrt(total))}
     for name, v in squares.items():
         if out[name] is not None and "sd" in out[name]:
-            out[name]["share"] = float(v / total) if total > 0 else np.nan
+            known = total > 0 and (name != "numerics" or np.isfinite(n["sd"]))
+            out[name]["share"] = float(v / total) if known else np.nan
     if bias:
         n["bias_share"] = float(bias / total)
     first = [np.flatnonzero(condition == c)[0] for c in ids]

@@ -168,6 +168,8 @@ def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
     own = {"dt": 1.0, "width": 10.0, "length": 1.0, "tolerance": 1.0, "window": (10.0, 30.0)}
     found, text = said_of(every, own, rng)
     assert "at most" in text and "bias" not in text and "without" not in text and "bias_share" not in found["numerics"]
+    nothing, text = said_of(ROWS, {"width": 40.0}, rng)
+    assert np.isnan([nothing["numerics"]["sd"], nothing["numerics"]["share"]]).all() and "not known" in text
     refused, text = said_of({"refused": "converge.json is of another case, ice.size is 1 m there and 2 m here"}, None,
                             rng)
     assert "not known" in text and "ice.size is 1 m there" in text and "share" not in refused["numerics"]
