@@ -6,7 +6,7 @@ of the parameters, of each of them, of the computation.
 
 The study is a Latin hypercube (`sampling`, `samples`) with fields of its own for each condition, two or more of them
 (`repeats`) to tell fields from parameters. What the computation adds is not varied here: it is that of `bergtow
-converge` on the base case (`--converge FILE`, or converge.json in DIR).
+converge` on the base case (`--converge FILE`, or converge.json in DIR), from the value on that the study runs with.
 """
 import argparse
 import os
@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import command  # first: it has words for packages that are missing
+import compared
 import findings
 import loads
 import stat_budget
@@ -116,15 +117,27 @@ def those_there(e):
     return out
 
 
-def of_ensemble(e, of=OF[0], converge=None):
-    """The budget of a number of an ensemble; what the computation adds is known of means alone. Errors: RunError."""
+def numerics(e, converge):
+    """What the computation adds to means of an ensemble, as stat_budget.budget takes it; None where nothing is known.
+    Refused where converge.json is of another case."""
+    if converge is None:
+        return None
+    texts = compared.cases(e)
+    if why := compared.misfit(converge, texts):
+        return {"refused": f"converge.json is of another case, {why}; run `bergtow converge` on the base case"}
+    return stat_budget.relative_numerics(converge["rows"], compared.values(e, texts))
+
+
+def of_ensemble(e, of=OF[0], computed=None):
+    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of means alone. Errors:
+    RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study")
     if "fields: common" in e.study:
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own")
     meaning, rows, values = numbers(e, of)
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
-                               (converge or {}).get("rows", ()) if ":" not in of else ())
+                               computed if ":" not in of else None)
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
@@ -134,7 +147,8 @@ def of_ensemble(e, of=OF[0], converge=None):
 
 def of_all(e, some, converge):
     """The budget of the first number, with those of the others as "more"; budget.json."""
-    first, *more = (of_ensemble(e, of, converge) for of in some)
+    computed = numerics(e, converge)
+    first, *more = (of_ensemble(e, of, computed) for of in some)
     return first | {"more": more}
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The uncertainty budget of budget.py as one table and one picture."""
+from converge_text import percent
 from text_table import number, quantity, scale, table
 
 import numpy as np
@@ -42,12 +43,45 @@ def rows(found):
         source = given["source"] or "assumed"
         out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
                     "; ".join(t for t in (given["distribution"], source) if t)])
-    n = b["numerics"]
-    out.append(["numerics", "at most " + _force(found, n["sd"]) if n else "not studied",
-                _percent(n["sd"] / abs(mean)) if n else "", _percent(n["share"]) if n else "", "", "", ""])
+    out += _numerics(found)
     out.append(["together", _force(found, b["together"]["sd"]), _percent(b["together"]["sd"] / abs(mean)), "", "", "",
                 ""])
     return out
+
+
+def _numerics(found):
+    """The line of the scatter that the computation may add, and that of what it is known to add."""
+    n, mean = found["numerics"], abs(found["mean"])
+    if not n or "refused" in n:
+        return [["numerics", "not known" if n else "not studied", *[""] * 5]]
+    # a file of an earlier program does not say what is not in it
+    bound = "at most " if n.get("unknown") == {} else ""
+    known = n["sd"] is not None and np.isfinite(n["sd"])
+    out = [["numerics", bound + _force(found, n["sd"]) if known else "not known",
+            _percent(n["sd"] / mean) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
+    if n.get("biases"):
+        out.append([f"bias of {', '.join(n['biases'])}", _force(found, abs(n["bias"])),
+                    _percent(abs(n["bias"]) / mean), _percent(n["bias_share"]), "", "", ""])
+    return out
+
+
+def numerics_notes(found):
+    """Sentences on what is known of the computation, and what is not."""
+    n = found["numerics"]
+    if not n:
+        return "" if ":" in found["of"] else \
+            " Numerics: run `bergtow converge` on the base case and name its file with --converge."
+    if "refused" in n:
+        return f" Numerics: {n['refused']}."
+    said = ""
+    if n.get("biases"):
+        each = ", ".join(f"{name} by {percent(b)}" for name, b in n["biases"].items())
+        said = (f" Bias: the values to which it was converged change the mean, {each}; together "
+                f"{percent(n['bias'] / found['mean'])}. It is no scatter: no number here is corrected for it, and "
+                "its square is in the last line and the shares.")
+    if n.get("unknown"):
+        said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."
+    return said
 
 
 def notes(found):
@@ -59,13 +93,10 @@ def notes(found):
             " That is little: take the shares as a rough guide, and more conditions for better ones.")
         shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
                 f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
-    n = found["numerics"]
-    rest = "" if n or ":" in found["of"] else \
-        " Numerics: run `bergtow converge` on the base case and name its file with --converge."
     left = found["wanted"] - found["members"]
     missing = f" {left} of {found['wanted']} members are missing." if left else ""
     return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
-            f"{found['members']} tows.{missing} {shares}{rest}")
+            f"{found['members']} tows.{missing} {shares}{numerics_notes(found)}")
 
 
 def text(found, markdown=False):
@@ -90,7 +121,9 @@ def figure(found):
     width, height = fig.get_size_inches()
     fig.subplots_adjust(left=1.2 / width, right=1 - 0.25 / width, top=1 - 0.95 / height, bottom=0.7 / height,
                         wspace=0.55)
-    some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k]["sd"] is not None]
+    some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k].get("sd") is not None]
+    if (n := found["numerics"]) and n.get("biases"):
+        some.append(("bias", {"sd": abs(n["bias"])}))
     factor, unit = scale([found["together"]["sd"]], found["units"])
     for y, (name, p) in enumerate([*reversed(some), ("together", found["together"])]):
         left.barh(y, p["sd"] / factor, height=0.6, color=style.FAINT if name == "together" else style.ICE)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import stat_alike
 import stat_extreme
 import stat_load
 import stat_mean
@@ -186,6 +187,7 @@ def statistics(e, rows, options, gathered=None):
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
             "fields": len(fields), "members": len(rows), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "alike_p": stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)

@@ -31,7 +31,9 @@ def asked(s):
 
 
 def value(d, factor):
-    return "–" if "refused" in d else number(d["value"] / factor) + ("*" if d["beyond_data"] else "")
+    if "refused" in d:
+        return "–"
+    return number(text_table.designed(d["value"], d["largest"]) / factor) + ("*" if d["beyond_data"] else "")
 
 
 def ends(d, factor):
@@ -59,8 +61,8 @@ def design(s, markdown):
                      number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
                      d.get("model", "–")])
     notes = [
-        f"{asked(s)}. 95 %: interval over fields, without what the warnings name. * beyond the hours "
-        f"simulated: extrapolated by the tail."
+        f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
+        f"warnings name. * beyond the hours simulated: extrapolated by the tail."
     ]
     notes += [text for text in (steps(s), holds_for(s)) if text]
     return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
@@ -248,7 +250,8 @@ def returns(s, markdown):
     note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
             "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
             "below 0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, profile likelihood, widened "
-            "by the scatter between fields. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels "
+            "by the scatter between fields that are alike. * beyond the hours simulated: extrapolated. ! shape below "
+            "-0.5: the levels "
             "are little more than the largest value seen. No bound: the upper end is more than "
             f"{text_table.FAR:g} times the level.")
     # what to do about it is for a terminal

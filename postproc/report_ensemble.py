@@ -85,15 +85,15 @@ def sections(markdown):
     return intro, [part for part in parts if part[0] != "Members"]
 
 
-def worth(value, low, high):
-    """(value, interval) of a force in words, to the two digits that the wider side of the interval leaves; "no bound"
-    where it has no end."""
+def worth(value, low, high, least=-np.inf):
+    """(value, interval) of a force in words: to three digits, up where the nearest lies below `least` and the value
+    does not; to the two digits that the wider side of the interval leaves; "no bound" where it has no end."""
     factor, unit = style.scale([value], "N")
     place = text_table.last_place(value / factor, low / factor, high / factor)
+    said = style.quantity(text_table.designed(value, least), "N")
     if place is None:
-        return style.quantity(value, "N"), "–"
-    some = [text_table.to_place(x / factor, place) for x in (value, low, high)]
-    return f"{some[0]} {unit}", f"{some[1]} to {some[2]} {unit}"
+        return said, "–"
+    return said, f"{' to '.join(text_table.to_place(x / factor, place) for x in (low, high))} {unit}"
 
 
 MARGIN = 1.05  # times the largest value simulated: what is less has little room for what was not seen
@@ -119,7 +119,7 @@ def design_row(c):
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
-        value, interval = worth(d["value"], *d["interval_95"])
+        value, interval = worth(d["value"], *d["interval_95"], d["largest"])
         return [value + marks(d), interval]
     return [unbroken(c["label"]), *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
             report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
@@ -152,7 +152,7 @@ def answer(e, s, case, results):
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(case, s) + report_method.beyond(results)}] if case else []
+             "rows": report_method.holds(case, s) + report_method.beyond(results, e)}] if case else []
     return out + [lines(held)] * bool(held)
 
 
@@ -163,14 +163,14 @@ def governing(s):
         return "No condition has a design tow force."
     c = max(some, key=lambda c: c["design"]["tow"]["value"])
     d = c["design"]["tow"]
-    def both(x):
+    def both(x, least=-np.inf):
+        """A force and the same number in tonnes-force."""
+        x = text_table.designed(x, least)
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
-    value = worth(d["value"], *d["interval_95"])[0]
     said = without_value(s, d["value"])
-    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, {value} "
-             f"({text_table.number(d['value'] / TONNE_FORCE)} tonne-force); upper end of its interval "
-             f"{both(d['interval_95'][1])}")
+    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
+             f"{both(d['value'], d['largest'])}; upper end of its interval {both(d['interval_95'][1])}")
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
 

@@ -4,7 +4,9 @@ from what was simulated."""
 import numpy as np
 
 import capability_text
+import compared
 import loads_text
+import stat_alike
 import stat_extreme
 import stat_profile
 from text_table import number, quantity
@@ -55,7 +57,9 @@ def method(s, case):
         "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
         "95 % intervals come from the profile "
         f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on; each condition "
-        "is fitted by itself, so their ends need not rise with the concentration. At least "
+        "is fitted by itself, so their ends need not rise with the concentration. They hold for fields that are alike: "
+        f"a test at {100 * stat_alike.LEVEL:g} % of the maxima of blocks, by their ranks, warns of conditions whose "
+        "fields differ by more than chance. At least "
         f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are required; otherwise there "
         "is no value.")
     if any(c["design"]["tension"] for c in s["conditions"]):
@@ -101,8 +105,10 @@ def limits(case, jams):
         out.append("No vessel is judged: the case names no bollard pull.")
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
-    out.append("The intervals cover the scatter of the fields and the error of the fit. They cover neither the values "
-               "that are assumed nor the choice of the model, and there is no safety factor in any number.")
+    out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
+               "in level, return levels and the design value are borne by fields worse than any simulated, and lie "
+               "above the interval more often than it says. The intervals cover neither the values that are assumed "
+               "nor the choice of the model, and there is no safety factor in any number.")
     return out
 
 
@@ -141,22 +147,27 @@ def _capability(found):
                f"{number(found['speed'])} m/s{name}", at)
 
 
-def _convergence(found):
-    """What converge.json says in one line: what matters, what does not, what stayed open."""
-    rows = [r for r in found["rows"] if r["name"] != "fields"]
-    by = {judged: list(dict.fromkeys(r["name"] for r in rows if r["judged"] == judged))
-          for judged in ("matters", "open", "none")}
-    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"))
-    return "; ".join(f"{said} {', '.join(by[judged])}" for judged, said in words if by[judged]) or "nothing compared"
+def _convergence(found, e):
+    """What converge.json says in one line of the values that the case has: what matters, what does not, what stayed
+    open, what was compared at another value alone. A quantity has one verdict: of 2 s against 1 s, if 2 s is the time
+    step of the case, and not that of 1 s against 0.5 s as well."""
+    texts = compared.cases(e)
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    verdicts = compared.verdicts(found["rows"], compared.values(e, texts))
+    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
+             ("elsewhere", "not compared at the value of these tows:"))
+    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
+    return "; ".join(f"{said} {', '.join(names)}" for said, names in some if names) or "nothing compared"
 
 
-def beyond(results):
-    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py."""
+def beyond(results, e):
+    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
-                 else _convergence(converge)))
+                 else _convergence(converge, e)))
     return rows + list(_capability(results["capability"]) if "capability" in results else [])

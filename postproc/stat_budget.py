@@ -17,9 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+import compared
 import stat_sensitivity
 
 LEAST = 8            # conditions
+QUANTITIES = ("width", "length", "dt", "tolerance", "window")  # of converge.py, that act on the mean
 
 
 @dataclass(frozen=True)
@@ -75,24 +77,56 @@ def shares(parameters, means):
     return max(plain, logs, key=rank)
 
 
-def relative_numerics(rows):
-    """Standard deviation that the computation may add, relative to the mean, from the rows of converge.json; None where
-    there are none.
+def _of_a_chain(chain):
+    """(bias, standard deviation, why they are not all) of a quantity, relative to the mean of the study; chain: rows
+    of converge.json that begin at its value.
 
-    Of each quantity the last comparison counts, made from the value that is recommended on: half the larger end of its
-    interval, added as squares. It holds the scatter of that study, so it is an upper bound rather than an estimate.
+    An effect that matters is known: what all of them make together is a bias. Its error is half the half-width of its
+    interval. Of the last comparison, whose effect may be none, half the larger end of the interval: that holds the
+    scatter of that comparison, so it is an upper bound rather than an estimate.
     """
-    last = {}
-    for row in rows:
-        ends = row.get("interval_95")
-        if row["name"] in ("width", "length", "dt", "tolerance", "window") and ends and None not in ends:
-            last[row["name"]] = max(abs(ends[0]), abs(ends[1])) / 2
-    return float(np.sqrt(sum(u * u for u in last.values()))) if last else None
+    factor, squares = 1.0, 0.0
+    for row in chain:
+        low, high = (np.nan if x is None else x for x in row.get("interval_95") or (None, None))
+        if not np.isfinite([low, high]).all():
+            return factor - 1, np.sqrt(squares), "not resolved"
+        matters = row.get("judged") == "matters"
+        squares += (factor * ((high - low) / 4 if matters else max(abs(low), abs(high)) / 2)) ** 2
+        factor *= 1 + row["effect"] if matters else 1.0
+    return factor - 1, np.sqrt(squares), "matters up to the last value compared" if matters else ""
 
 
-def budget(parameters, condition, y, converge=()):
-    """Everything as nested dicts. parameters: {name: [M]}, condition [M], y [M]; converge: rows of converge.json.
-    {"refused": why} where there are too few conditions."""
+def relative_numerics(rows, own):
+    """What the computation adds, relative to the mean, from the rows of converge.json and the values that the study
+    runs with, {quantity: value}: {"sd", NaN where nothing is known; "biases": {quantity: relative effect}; "unknown":
+    {quantity: why sd does not bound it}}; None without rows."""
+    squares, biases, unknown = [], {}, {}
+    for name in QUANTITIES:
+        chain = compared.chain(rows, name, own.get(name))
+        if not chain:
+            unknown[name] = "not compared at the value of this study" if any(r["name"] == name for r in rows) else \
+                "not varied"
+            continue
+        bias, sd, why = _of_a_chain(chain)
+        squares += [sd * sd] if sd > 0 or not why else []
+        biases |= {name: float(bias)} if bias else {}
+        unknown |= {name: why} if why else {}
+    return {"sd": float(np.sqrt(sum(squares))) if squares else np.nan, "biases": biases,
+            "unknown": unknown} if len(rows) else None
+
+
+def _numerics(relative, mean):
+    """The same of a mean, with "bias": all biases together, in its unit."""
+    if relative is None or "refused" in relative:
+        return relative
+    bias = np.prod([1 + b for b in relative["biases"].values()]) - 1
+    return relative | {"sd": relative["sd"] * abs(mean), "bias": float(bias * mean)}
+
+
+def budget(parameters, condition, y, numerics=None):
+    """Everything as nested dicts. parameters: {name: [M]}, condition [M], y [M]; numerics: relative_numerics(), or
+    {"refused": why}. {"refused": why} where there are too few conditions. The shares are those of the mean square
+    deviation from what a converged computation would give: of the variance, and of the square of a bias."""
     y, condition = np.asarray(y, dtype=float), np.asarray(condition)
     ids = np.unique(condition)
     if len(ids) < LEAST:
@@ -105,15 +139,18 @@ def budget(parameters, condition, y, converge=()):
     for name in ("fields", "parameters"):
         v = getattr(whole, name)
         out[name] = _sd(v, _interval(v, [getattr(p, name) for p in without], True))
-    numerics = relative_numerics(converge)
-    out["numerics"] = None if numerics is None else {"sd": numerics * abs(whole.mean)}
-    variances = {"fields": np.nan_to_num(whole.fields), "parameters": max(whole.parameters, 0.0),
-                 "numerics": (numerics or 0.0) ** 2 * whole.mean ** 2}
-    total = sum(variances.values())
+    n = out["numerics"] = _numerics(numerics, whole.mean)
+    squares = {"fields": np.nan_to_num(whole.fields), "parameters": max(whole.parameters, 0.0),
+               "numerics": np.nan_to_num(n["sd"]) ** 2 if n and "sd" in n else 0.0}
+    bias = n.get("bias", 0.0) ** 2 if n else 0.0
+    total = sum(squares.values()) + bias
     out["together"] = {"sd": float(np.sqrt(total))}
-    for name, v in variances.items():
-        if out[name] is not None:
-            out[name]["share"] = float(v / total) if total > 0 else np.nan
+    for name, v in squares.items():
+        if out[name] is not None and "sd" in out[name]:
+            known = total > 0 and (name != "numerics" or np.isfinite(n["sd"]))
+            out[name]["share"] = float(v / total) if known else np.nan
+    if bias:
+        n["bias_share"] = float(bias / total)
     first = [np.flatnonzero(condition == c)[0] for c in ids]
     out["shares"] = shares({k: np.asarray(v)[first] for k, v in parameters.items()},
                            np.array([np.mean(g) for g in groups]))

@@ -17,9 +17,9 @@ clusters far up come like a Poisson process.
 
 Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py).
 With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
-tail itself, and the threshold, are assumed. Below a shape of -1/2 maximum likelihood is irregular
-[Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels;
-this is reported.
+tail itself, and the threshold, are assumed, and fields that are alike (stat_alike.py). Below a shape of -1/2 maximum
+likelihood is irregular [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak,
+and so are the levels; this is reported.
 
 A load that something limits - a thrust at the bollard pull - stays at its largest value. Such a sample has no tail, and
 is refused in words. Values that differ by rounding alone are the same (TIE): in a moving mean of such a signal they
@@ -189,8 +189,9 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
 
 
 def interval_note(fields):
-    return ("profile likelihood, widened by the scatter between fields" if fields >= stat_profile.LEAST_FIELDS
-            else "profile likelihood; scatter between fields left out: too few of them")
+    if fields < stat_profile.LEAST_FIELDS:
+        return "profile likelihood; scatter between fields left out: too few of them"
+    return "profile likelihood, widened by the scatter between fields that are alike"
 
 
 def gpd_minus_log_likelihood(log_scale, shape, y):

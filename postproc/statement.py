@@ -5,13 +5,14 @@ tow of stated length, its interval over fields, what it holds for, and what spea
     p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
 Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
 domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a start-up,
-which no number holds, that takes more than the value.
+which no number holds, that takes more than the value, fields that are not alike.
 """
 from dataclasses import dataclass
 
 import numpy as np
 
 import loads
+import stat_alike
 import stat_load
 import stat_mean
 import stat_profile
@@ -160,6 +161,7 @@ def _of_the_sample(e, rows, c, load):
         out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
     if "refused" in d:
         return out + [("no value", d["refused"])]
+    out += _of_unlike_fields(load)
     hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
     if hours > LONG * simulated > 0 and np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0) >= LOCKS:
         out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
@@ -175,6 +177,18 @@ def _of_the_sample(e, rows, c, load):
     if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
         out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
     return out + _of_the_models(load)
+
+
+def _of_unlike_fields(load):
+    """Do the fields differ by more than chance? Of a single field another warning tells."""
+    p = load["alike_p"]
+    if np.isnan(p):
+        return [("the windows are too short to tell whether the fields are alike, as the interval takes them", "")
+                ] if load["fields"] > 1 else []
+    return [] if p >= stat_alike.LEVEL else [(
+        "the fields differ by more than chance within a field: the interval holds for fields that are alike, and the "
+        "value can be too small, since fields worse than any of these bear the load of a longer time",
+        f"{load['fields']} fields, p {'< 0.0001' if p < 1e-4 else f'= {short(p, 2)}'}")]
 
 
 def start_exceeds(d):

@@ -57,15 +57,32 @@ def number(value, digits=3):
     return short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
 
 
+def _first(value):
+    """Decimal place of the first digit."""
+    return int(np.floor(np.log10(abs(value))))
+
+
+def designed(value, least=-np.inf):
+    """A load that is designed for, to three digits, which is within 0.5 %: with two, 1049 would be 1000. Rounded up
+    where the nearest lies below `least`, the largest simulated, and the value itself does not."""
+    if value == 0 or not np.isfinite(value):
+        return value
+    place = _first(value) - 2
+    nearest = round(value, -place)
+    return nearest if nearest >= least or value < least else round(nearest + 10.0 ** place, -place)
+
+
 def last_place(value, low, high):
-    """Decimal place of the last digit that a value is worth: of the two digits that the wider side of its interval
-    leaves, and two to three of its own: with one, 947 beside an end of 2,200 would be 900, below what was simulated.
+    """Decimal place of the last digit that the ends of an interval are worth: of the two digits that its wider side
+    leaves, and two to three of the value's own; three where an end would be rounded to the other side of the value.
     None where no side has a width."""
     wide = max((abs(end - value) for end in (low, high) if np.isfinite(end)), default=0.0)
     if not wide > 0:
         return None
-    first = int(np.floor(np.log10(max(abs(value), 1e-300))))
-    return min(max(int(np.floor(np.log10(wide))) - 1, first - 2), first - 1)
+    first = _first(value if value else wide)
+    place, there = min(max(_first(wide) - 1, first - 2), first - 1), designed(value)
+    below, above = (round(end, -place) if np.isfinite(end) else there for end in (low, high))
+    return place if below <= there <= above else first - 2
 
 
 def to_place(value, place):
@@ -74,15 +91,15 @@ def to_place(value, place):
 
 
 def level(value, ends, factor=1.0):
-    """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds
-    nothing: it says that the sample does not know the tail."""
+    """A level, to three digits, and its interval, to those that it is worth. An upper end FAR times the level away
+    bounds nothing: it says that the sample does not know the tail."""
     low, high = ends
     if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
         high = np.inf
     place = last_place(value / factor, low / factor, high / factor)
     if place is None or np.isnan([low, high]).any():
         return number(value / factor), pair((low, high), factor)
-    return to_place(value / factor, place), " to ".join(to_place(v / factor, place) for v in (low, high))
+    return number(value / factor), " to ".join(to_place(v / factor, place) for v in (low, high))
 
 
 def pair(values, factor=1.0):

@@ -81,6 +81,28 @@ class POISSON(EAR1):
         self.phi, self.chance, self.name = 0.5, chance, f"filtered Poisson process of {chance:g}"
 
 
+class UNLIKE(Chain):
+    """Fields of AR(1) that differ in level: each is multiplied by exp(s g), or raised by s g, with a normal g of its
+    own. In the long run a level is exceeded at the mean of the rates of all fields, drawn or not."""
+
+    GRID = np.linspace(1.0, 9.0, 60)  # levels of AR(1): below the first there are no rare clusters, beyond nothing
+
+    def __init__(self, phi, s, raised=False):
+        self.process, self.s, self.raised = AR1(phi), s, raised
+        self.name = f"AR(1) of {phi:g} {f'+ {s:g} g' if raised else f'x exp({s:g} g)'}"
+        self.bracket = (1.0, 60.0 if raised else 400.0)
+        self.logs = np.log([self.process.rate(z) for z in self.GRID])
+
+    def rate(self, z):
+        g = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)
+        own = z - self.s * g if self.raised else z / np.exp(self.s * g)
+        return np.mean(np.exp(np.interp(own, self.GRID, self.logs, right=-60.0)))
+
+    def sample(self, fields, n, rng):
+        x, g = self.process.sample(fields, n, rng), rng.standard_normal((fields, 1))
+        return x + self.s * g if self.raised else x * np.exp(self.s * g)
+
+
 def fields_of(process, fields, n, rng):
     """Fields as stat_load has them; the time scale is a sample."""
     time = np.arange(1.0, n + 1)

@@ -18,9 +18,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import budget  # noqa: E402
 import budget_text  # noqa: E402
+import compared  # noqa: E402
 import findings  # noqa: E402
 import stat_budget  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow_read import Run, RunError  # noqa: E402
 from command import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
@@ -106,14 +107,82 @@ def test_a_response_of_many_scales_is_shared_out_on_its_logarithm():
     assert found["shares"]["indices"]["a"]["first"] == pytest.approx(16 / 25, abs=0.05)
 
 
-def test_numerics_are_those_of_the_last_comparisons():
-    rows = [{"name": "width", "interval_95": [-0.5, -0.3]}, {"name": "width", "interval_95": [-0.06, 0.02]},
-            {"name": "dt", "interval_95": [0.01, 0.08]}, {"name": "start", "interval_95": [1.0, 2.0]},
-            {"name": "length", "interval_95": [None, None]}, {"name": "fields"}]
-    assert stat_budget.relative_numerics(rows) == pytest.approx(np.hypot(0.03, 0.04))
-    assert stat_budget.relative_numerics([]) is None
-    made = drawn(lambda u: 10 + u[:, 0], 40, 1, 2, 0.3, np.random.default_rng(6))
-    assert stat_budget.budget(*made, rows)["numerics"]["sd"] == pytest.approx(0.05 * made[2].mean(), rel=0.01)
+ROWS = [{"name": "dt", "judged": "matters", "effect": -0.3, "interval_95": [-0.35, -0.25], "from": 2.0, "to": 1.0},
+        {"name": "dt", "judged": "none", "effect": 0.0, "interval_95": [-0.04, 0.02], "from": 1.0, "to": 0.5},
+        {"name": "width", "judged": "none", "effect": 0.0, "interval_95": [-0.03, 0.06], "from": 10.0, "to": 20.0},
+        {"name": "start", "judged": "matters", "effect": 1.5, "interval_95": [1.0, 2.0], "from": 1.0, "to": 4.0},
+        {"name": "fields", "judged": "none"}]
+LEFT = {"length": "not varied", "tolerance": "not varied", "window": "not varied"}
+
+
+def test_numerics_begin_at_the_value_of_the_study():
+    """Of what was compared at finer values only what lies beyond counts, and of a coarser one nothing is known."""
+    def found(rows=ROWS, **own):
+        return stat_budget.relative_numerics(rows, {"width": 10.0, **own})
+    assert found(dt=1.0) == {"sd": pytest.approx(np.hypot(0.02, 0.03)), "biases": {}, "unknown": LEFT}
+    coarse = found(dt=2.0)
+    assert coarse["biases"] == {"dt": pytest.approx(-0.3)} and coarse["unknown"] == LEFT
+    assert coarse["sd"] == pytest.approx(np.sqrt(0.025 ** 2 + (0.7 * 0.02) ** 2 + 0.03 ** 2))
+    for dt in (0.5, 3.0, None):
+        other = found(dt=dt)
+        assert other["unknown"] == {"dt": "not compared at the value of this study"} | LEFT
+        assert other["sd"] == pytest.approx(0.03)
+    still = found(ROWS[:1], dt=2.0, width=None)
+    assert still["unknown"]["dt"] == "matters up to the last value compared" and still["biases"]
+    spent = found([{"name": "dt", "judged": "open", "interval_95": [None, None], "from": 2.0, "to": 1.0}], dt=2.0)
+    assert spent["unknown"]["dt"] == "not resolved" and np.isnan(spent["sd"])
+    assert stat_budget.relative_numerics([], {}) is None
+
+
+def test_a_window_fits_where_both_of_its_ends_do():
+    rows = [{"name": "window", "judged": "none", "interval_95": [-0.02, 0.04], "from": 600.0, "to": 2100.0}]
+    def sd(start, end):
+        return stat_budget.relative_numerics(rows, {"window": (start, end)})["sd"]
+    assert sd(600.0, 3600.0) == sd(605.0, 3600.0) == pytest.approx(0.02)
+    assert np.isnan([sd(700.0, 3600.0), sd(600.0, 7200.0)]).all()
+
+
+def said_of(rows, own, rng):
+    made = drawn(lambda u: 10 + u[:, 0], 40, 1, 2, 0.3, rng)
+    found = stat_budget.budget(*made, stat_budget.relative_numerics(rows, own) if own else rows) | {
+        "units": "N", "of": "mean_ice_resistance_n", "meaning": "mean", "wanted": 80, "title": "t",
+        "assumed": {"a": {"distribution": "uniform", "source": ""}}}
+    budget_text.figure(plain(found))
+    return found, budget_text.text(plain(found))
+
+
+def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
+    """The budget of a study at a time step that matters by -30 % is mostly that, and says what nobody resolved."""
+    rng = np.random.default_rng(6)
+    found, text = said_of(ROWS, {"dt": 2.0, "width": 40.0}, rng)
+    n = found["numerics"]
+    assert n["bias"] == pytest.approx(-0.3 * found["mean"]) and n["bias_share"] > 0.9
+    shares = [found[part]["share"] for part in ("fields", "parameters", "numerics")]
+    assert sum(shares) + n["bias_share"] == pytest.approx(1)
+    assert found["together"]["sd"] > abs(n["bias"]) and "bias of dt" in text and "dt by -30 %" in text
+    assert "at most" not in text and "width (not compared at the value of this study)" in text
+    assert "length (not varied)" in text
+    every = ROWS + [{"name": name, "judged": "none", "interval_95": [-0.01, 0.01], "from": 1.0, "to": 2.0}
+                    for name in ("length", "tolerance")]
+    every += [{"name": "window", "judged": "none", "interval_95": [-0.01, 0.01], "from": 10.0, "to": 20.0}]
+    own = {"dt": 1.0, "width": 10.0, "length": 1.0, "tolerance": 1.0, "window": (10.0, 30.0)}
+    found, text = said_of(every, own, rng)
+    assert "at most" in text and "bias" not in text and "without" not in text and "bias_share" not in found["numerics"]
+    nothing, text = said_of(ROWS, {"width": 40.0}, rng)
+    assert np.isnan([nothing["numerics"]["sd"], nothing["numerics"]["share"]]).all() and "not known" in text
+    refused, text = said_of({"refused": "converge.json is of another case, ice.size is 1 m there and 2 m here"}, None,
+                            rng)
+    assert "not known" in text and "ice.size is 1 m there" in text and "share" not in refused["numerics"]
+
+
+def test_converge_of_another_case_does_not_fit():
+    """A key that all members have alike, and it has not; not one that is varied, nor one of the computation."""
+    texts = [{"ice.size": "2 m", "ice.friction": f"{f}", "run.dt": "1 s", "ice.field": "/a/field.h5"} for f in (1, 2)]
+    def why(**values):
+        return compared.misfit({"values": texts[0] | {k.replace("__", "."): v for k, v in values.items()}}, texts)
+    assert why() == why(ice__friction="9", run__dt="5 s", ice__field="/b/field.h5") == compared.misfit({}, texts) == ""
+    assert why(ice__size="3 m") == "ice.size is 3 m there and 2 m here"
+    assert why(ice__field="other.h5") == "ice.field is other.h5 there and /a/field.h5 here"
 
 
 # ---- the sampler
@@ -194,11 +263,20 @@ def test_a_study_end_to_end(small):
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
     block = findings.chapter("budget", findings.read("budget", folder / "out"))
     assert block["markdown"].startswith("| part |") and len(block["figure"]().axes) == 2
-    (folder / "converge.json").write_text(json.dumps({"rows": [{"name": "dt", "interval_95": [-0.1, 0.2]}]}))
-    again = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--converge", "converge.json"], cwd=folder,
-                           env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True)
-    assert again.returncode == 0 and "at most" in again.stdout
-    assert json.loads((folder / "out/budget.json").read_text())["numerics"]["sd"] == pytest.approx(0.1 * abs(y.mean()))
+    case = Run(member).case
+    row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
+    def with_it(row, values):
+        (folder / "converge.json").write_text(json.dumps({"rows": [row], "values": values}))
+        again = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--converge", "converge.json"], cwd=folder,
+                               env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True)
+        assert again.returncode == 0, again.stderr
+        return again.stdout, json.loads((folder / "out/budget.json").read_text())["numerics"]
+    said, numerics = with_it(row, case)
+    assert "Numerics without width (not varied)" in said and numerics["sd"] == pytest.approx(0.1 * abs(y.mean()))
+    said, numerics = with_it(row | {"from": 2 * row["from"]}, case)
+    assert "dt (not compared at the value of this study)" in said and numerics["sd"] is None
+    said, numerics = with_it(row, case | {"ice.size": "77 m"})
+    assert "of another case, ice.size is 77 m there" in numerics["refused"] and numerics["refused"] in said
 
 
 def test_what_is_refused(small, tmp_path):

@@ -110,6 +110,7 @@ def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp
     found, text = converged(tmp_path, loose, "--vary", "tolerance,fields", "--budget", 3)
     first, second = found["rows"]
     assert first["judged"] == "none" and first["same_ice"] and "0.001 will do" in text
+    assert found["values"]["ice.concentration"] == "0.2"  # of which case it speaks, for other studies
     assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text
 
 

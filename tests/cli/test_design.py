@@ -17,6 +17,7 @@ sys.path.insert(0, str(ROOT / "postproc"))
 
 import design  # noqa: E402
 import domain_width  # noqa: E402
+import loads_text  # noqa: E402
 import pdf  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
@@ -127,15 +128,33 @@ def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
 
 @pytest.mark.parametrize("value, low, high, words", [
     (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")),
-    (123456.0, 20000.0, 1.5e6, ("120 kN", "20 to 1500 kN")),
-    (947e3, 924e3, 2200e3, ("950 kN", "920 to 2200 kN")),
-    (5.2e6, 4.13e6, np.inf, ("5.2 MN", "4.1 to no bound MN")),
+    (123456.0, 20000.0, 1.5e6, ("123 kN", "20 to 1500 kN")),
+    (947e3, 924e3, 2200e3, ("947 kN", "920 to 2200 kN")),
+    (5.2e6, 4.13e6, np.inf, ("5.20 MN", "4.1 to no bound MN")),
     (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
     (12.0, np.nan, np.nan, ("12.0 N", "–")), (0.0, 0.0, 0.0, ("0 N", "–")),
-    (17.0, 0.0, 3e6, ("17 N", "0 to 3000000 N"))
+    (17.0, 0.0, 3e6, ("17.0 N", "0 to 3000000 N")), (1049e3, 900e3, 3200e3, ("1050 kN", "900 to 3200 kN")),
+    (1051e3, 1050.5e3, 9000e3, ("1050 kN", "1050 to 9000 kN"))
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
     assert report_ensemble.worth(value, low, high) == words
+
+
+@pytest.mark.parametrize("value, largest, words", [
+    (1049e3, 1040e3, "1050 kN"), (1044e3, 1043e3, "1050 kN"), (1043e3, 1044e3, "1040 kN"), (1e6, 1e6, "1000 kN"),
+    (999.4e3, 999.2e3, "1000 kN"), (2.004e6, 2.003e6, "2.01 MN"), (1400e3, 2e5, "1400 kN")
+])
+def test_a_value_is_not_rounded_below_the_largest_simulated(value, largest, words):
+    """In the answer, the sentence on the largest with its tonnes-force, which are those of the number that stands
+    there, and the table of the terminal."""
+    d = {"value": value, "interval_95": (0.9 * value, 3 * value), "largest": largest, "beyond_data": False,
+         "start_up": None}
+    assert report_ensemble.worth(value, *d["interval_95"], largest)[0] == words
+    said = report_ensemble.governing({"conditions": [{"label": "c", "design": {"tow": d}}]})
+    newtons = float(words.split()[0]) * {"kN": 1e3, "MN": 1e6}[words.split()[1]]
+    assert f"c, {words} ({text_table.number(newtons / 9806.65)} tonne-force)" in said
+    assert abs(newtons / value - 1) < 0.006 and (value < largest or newtons > 0.999999 * largest)
+    assert float(loads_text.value(d, 1e3)) == pytest.approx(newtons / 1e3)
 
 
 @pytest.mark.parametrize("value, largest, model, beyond, marks", [
@@ -166,12 +185,12 @@ def test_the_title_names_no_other_concentration(title, left):
 def test_levels_have_the_digits_that_they_are_worth():
     some = (99.96, 1642.0, 0.09996, 1.5e7, None)
     assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
-    assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1600", "100 to 10000")
-    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("620", "470 to no bound")
+    assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "100 to 10000")
+    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("616", "470 to no bound")
     assert text_table.level(681.4e3, (667.2e3, 709.4e3), 1e3) == ("681", "667 to 709")
-    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.6", "0.1 to no bound")
+    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.1 to no bound")
     assert text_table.level(1642.0, (np.nan, np.nan), 1e3) == ("1.64", "–")
-    assert text_table.level(3.0, (-0.04, 5.0), 1.0) == ("3.0", "0.0 to 5.0")  # no minus zero
+    assert text_table.level(3.0, (-0.04, 5.0), 1.0) == ("3.00", "0.0 to 5.0")  # no minus zero
     assert report_case.short("2.60245e-16 m") == "0 m" and report_case.short("-3.24837e-17 m") == "0 m"
 
 

@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 import made_up_ensemble as made_up
-from signals_known import AR1, EAR1, POISSON, coverage, fields_of
+from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 from test_postproc import script
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
@@ -22,7 +22,9 @@ import ensemble  # noqa: E402
 import ensemble_text  # noqa: E402
 import loads  # noqa: E402
 import loads_text  # noqa: E402
+import report_method  # noqa: E402
 import plot_ensemble  # noqa: E402
+import stat_alike  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
 import statement as statement_module  # noqa: E402
@@ -122,6 +124,74 @@ def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
     least = stats.binom.ppf(2e-3, TRIALS, 0.9)
     for kind, (inside, ratio) in found.items():
         assert min(inside) >= least and 0.75 < min(ratio) <= max(ratio) < 1.3, (kind, inside, ratio)
+
+
+# ---- fields that are not alike
+
+def test_levels_of_fields_that_differ():
+    """Of no difference those of the process; of a scale of each field, what simulated years have."""
+    same, unlike = UNLIKE(0.9, 0.0), UNLIKE(0.9, 0.5)
+    assert same.level(10.0) == pytest.approx(AR1(0.9).level(10.0), rel=1e-3)
+    z = unlike.level(1.0)
+    x = unlike.sample(2000, 3600, np.random.default_rng(6))
+    found = [len(stat_extreme.clusters(np.arange(3600.0), y, z, 40.0)) for y in x]
+    assert np.mean(found) == pytest.approx(1.0, abs=4 * stats.sem(found))
+
+
+SETS = 200
+
+
+def found_unlike(process, fields, n, sets=SETS):
+    """Share of sets of fields that the test says to differ."""
+    rng, out = np.random.default_rng(31), []
+    for _ in range(sets):
+        some = fields_of(process, fields, n, rng)
+        out.append(stat_alike.p_value(some, stat_load.LEAST_GAPS * stat_load.gap_of(some)) < stat_alike.LEVEL)
+    return np.mean(out)
+
+
+@pytest.mark.parametrize("process, fields, n", [(AR1(0.9), 8, 2000), (AR1(0.5), 20, 480), (EAR1(0.9), 8, 2000),
+                                                (POISSON(0.02), 8, 4000), (AR1(0.9), 2, 2000)],
+                         ids=lambda v: getattr(v, "name", None))
+def test_fields_that_are_alike_are_hardly_ever_said_to_differ(process, fields, n):
+    """The level is 1 %; of 500 sets of each of ten processes it was 0.2 to 2 %."""
+    assert SETS * found_unlike(process, fields, n) <= stats.binom.ppf(0.999, SETS, 0.02)
+
+
+@pytest.mark.parametrize("process, fields, n, least", [
+    (UNLIKE(0.9, 0.5), 8, 2000, 0.95), (UNLIKE(0.9, 0.5), 5, 1000, 0.85), (UNLIKE(0.9, 0.2), 20, 2000, 0.9),
+    (UNLIKE(0.9, 0.5, raised=True), 8, 2000, 0.85)], ids=lambda v: getattr(v, "name", None))
+def test_fields_that_differ_are_found(process, fields, n, least):
+    assert found_unlike(process, fields, n, 60) >= least
+
+
+def test_where_fields_cannot_be_compared_nothing_is_said():
+    """A single field, windows of less than two blocks; and a field of twice the length is alike in its first half."""
+    some = fields_of(AR1(0.9), 8, 2000, np.random.default_rng(2))
+    assert np.isnan([stat_alike.p_value(some[:1], 100.0), stat_alike.p_value(some, 1500.0)]).all()
+    longer = fields_of(AR1(0.9), 1, 20000, np.random.default_rng(9))
+    assert stat_alike.p_value([*some, *longer], 100.0) > stat_alike.LEVEL
+    level = [f | {"peak": np.full(len(f["peak"]), 1.0 + k)} for k, f in enumerate(some)]
+    assert stat_alike.p_value(level, 100.0) == 0 and stat_alike.p_value([level[0]] * 3, 100.0) == 1
+
+
+def test_a_condition_whose_fields_differ_is_warned_of(tmp_path):
+    """In the design statement; and what the intervals hold for stands in tables, method and limits."""
+    rng, some = np.random.default_rng(12), []
+    for c, spread in ((0, 0.0), (1, 0.5)):
+        for _ in range(8):
+            x = 1e6 + 1e5 * np.exp(spread * rng.standard_normal()) * made_up.ar1(0.8, N, rng)
+            some.append(made_up.member(x, {"ice.concentration": 0.5 + 0.1 * c}, c, more={"tow_force": x},
+                                       attributes=SERIES, case=CASE.format(pressure=1, load=0)))
+    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1)
+    said = [line for line in result.stdout.splitlines() if "fields differ by more than chance" in line]
+    assert len(said) == 1 and "concentration 60 % (8 fields, p < 0.0001)" in said[0] and "50 %" not in said[0]
+    assert result.stdout.count("fields that are alike") >= 3  # table of the design, its warning, return levels
+    s = json.loads((tmp_path / "all/statistics.json").read_text())
+    alike, unlike = (c["loads"]["tow_force"]["alike_p"] for c in s["conditions"])
+    assert alike > 0.01 > unlike
+    assert "scatter of fields that are alike" in report_method.limits(statement_module.case_of(Ensemble(
+        tmp_path / "all"), [0]), False)[-1] and "fields that are alike" in " ".join(report_method.method(s, None))
 
 
 def test_rates_of_exceedance_of_a_known_process():

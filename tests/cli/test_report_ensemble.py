@@ -43,7 +43,7 @@ def study(tmp_path_factory):
             times = np.sort(rng.uniform(1, 599, 60))
             some.append(
                 member(made_up.ar1(0.6, 600, rng, mean + 4 * k, 10.0), {"ice.concentration": concentration},
-                       c,
+                       c, case=f"ice:\n  concentration: {concentration}\ndomain:\n  width: 10 m\n",
                        peaks=(times, rng.exponential(50.0, 60))))
     some[3] |= {"status": FAILED, "reason": "exit code 5: not <finite>"}
     some[6] |= {"warnings": [JAM], "summary": {"stalled_windows": 2}}
@@ -253,6 +253,24 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
                   "width", sd):
         assert words in answered, words
+
+
+def test_a_quantity_has_one_verdict(tmp_path):
+    """That of the value which the tows have, and not of a finer one that was tried as well."""
+    rows = [{"name": "dt", "judged": "matters", "from": 2.0, "to": 1.0},
+            {"name": "dt", "judged": "none", "from": 1.0, "to": 0.5},
+            {"name": "width", "judged": "none", "from": 10.0, "to": 20.0},
+            {"name": "window", "judged": "none", "from": 10.0, "to": 30.0},
+            {"name": "length", "judged": "open", "why": "the case has no domain.length"}]
+    def said(name, **keys):
+        case = "run:\n  dt: {dt}\ndomain:\n  width: {width}\n".format(**{"dt": "2 s", "width": "10 m"} | keys)
+        some = [member(np.ones(50), {}, 0, case=case, start=10.0) for _ in range(2)]
+        e = Ensemble(made_up.write(tmp_path / name, some))
+        return dict(report_method.beyond({"converge": {"rows": rows}}, e))["width, length, time step, tolerance, start"]
+    assert said("a") == "it depends on dt; open is length; no effect that matters of width, window"
+    assert said("b", dt="1 s") == "open is length; no effect that matters of dt, width, window"
+    assert said("c", dt="0.5 s", width="40 m") == \
+        "open is length; no effect that matters of window; not compared at the value of these tows: dt, width"
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):

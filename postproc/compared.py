@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""What converge.json says of another study: of the value of each quantity that this study itself runs with, and not of
+any other that was tried.
+
+A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
+So what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
+"""
+import numpy as np
+
+from bergtow_read import Run, RunError, case_value
+
+#: {quantity of converge.py: the key that is its value}
+KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",
+        "tolerance": "solver.tolerance", "window": "output.window_start"}
+WINDOW = 0.01  # of its length: ends of a window fall on steps
+#: what makes another case of it; not where the domain lies, which goes with its size
+PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "domain.ends", "domain.sides")
+PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "body.x", "body.y", "tow.ramp")
+
+
+def cases(e):
+    """[{key: text}] of the members of an ensemble that can be read."""
+    out = []
+    for m in e.used:
+        try:
+            with Run(e.folder(m)) as run:
+                out.append(run.case)
+        except RunError:
+            continue
+    return out
+
+
+def _one(values, slack):
+    """The value that all have, None where they differ, or none is known."""
+    values = np.array(values, dtype=float)
+    if not len(values) or not np.isfinite(values).all() or np.ptp(values) > slack * np.abs(values).max():
+        return None
+    return float(values[0])
+
+
+def values(e, texts):
+    """{quantity: the value that all members have, None where they differ or it is not known}; of the window its two
+    ends, s, or None. texts: those of cases()."""
+    out = {name: _one([case_value(text, key) for text in texts], 1e-9) for name, key in KEYS.items()}
+    ends = [_one([e.number(f"window_{end}_s", m) for m in e.used], WINDOW) for end in ("start", "end")]
+    return out | {"window": None if None in ends else tuple(ends)}
+
+
+def _begins(row, value):
+    """Does the row compare this value with the next?"""
+    at = row.get("from")
+    if at is None or value is None:
+        return False
+    if row["name"] != "window":
+        return bool(np.isclose(at, value, rtol=1e-6, atol=0))
+    start, end = value  # `to` is the middle
+    return abs(at - start) <= WINDOW * (end - start) and abs(row["to"] - (start + end) / 2) <= WINDOW * (end - start)
+
+
+def chain(rows, name, value):
+    """Rows of a quantity from this value on, [] where no row begins there. A row without values, where nothing could be
+    compared, speaks of the case whatever its value."""
+    some = [row for row in rows if row["name"] == name]
+    begin = next((k for k, row in enumerate(some) if _begins(row, value)), len(some))
+    return some[begin:] or [row for row in some if "from" not in row]
+
+
+def verdicts(rows, own):
+    """{quantity that was compared: "matters", "none" or "open" at the study's own value, "elsewhere" where that was not
+    compared}."""
+    out = {}
+    for name in dict.fromkeys(row["name"] for row in rows if row["name"] in KEYS):
+        found = chain(rows, name, own.get(name))
+        out[name] = found[0]["judged"] if found else "elsewhere"
+    return out
+
+
+def _differ(a, b):
+    """Are two values of a key different? Of files the names count, since folders move."""
+    x, y = (case_value({"": text}, "") for text in (a, b))
+    if np.isfinite([x, y]).all():
+        return not np.isclose(x, y, rtol=1e-9, atol=1e-12)
+    return a.rpartition("/")[2] != b.rpartition("/")[2]
+
+
+def misfit(found, texts):
+    """Why converge.json is of another case than the members' (texts of cases()), "" where it is not, or does not say of
+    which it is: a key of the ice, the body, the tow, water or air that all members have alike, and it has not."""
+    for key, value in (found.get("values") or {}).items():
+        if not key.startswith(PHYSICAL) or key in PLACES:
+            continue
+        some = {text[key] for text in texts if key in text}
+        if len(some) == 1 and _differ(value, other := some.pop()):
+            return f"{key} is {value} there and {other} here"
+    return ""
