@@ -71,6 +71,8 @@ enum { BT_MAX_ESTIMATES = 24 };
 #define BT_EST_COMPACT 0.65
 /// φ − A up to which the ice counts as swept together: a field made for 0.9 may have 0.9 − 1e-16
 #define BT_EST_SWEPT 1e-9
+/// ΔV·d / ordered below which the body all but stands still, and no estimate tells that depends on the speed, assumed
+#define BT_EST_STILL 0.05
 #define BT_EST_DILUTE_MOST 0.25 ///< A above which floes hit each other before the body has passed, assumed
 
 /// What the estimates depend on, at the scale of the case.
@@ -81,7 +83,7 @@ typedef struct bt_estimate_input {
     double width;            ///< W, m
     double speed, along;     ///< |ΔV| and ΔV·d through the ice, m/s; NaN: nothing is towed
     double water_speed, water_along; ///< the same through the water
-    double ordered;          ///< ΔV·d of the speed that the tow asks for through the ice, m/s; NaN: nothing is towed
+    double ordered;          ///< ΔV·d if the body kept the speed that the tow asks for, m/s; NaN: nothing is towed
     double restitution;      ///< e, ice on body
     bool ship;               ///< the body is a ship
     double ice_density, water_density; ///< kg/m³
@@ -96,7 +98,8 @@ typedef struct bt_estimate {
     double force;     ///< N against the tow; NaN: the formula has no value here
     double low, high; ///< N, its range; equal to force where there is none
     bool valid;       ///< the formula is meant for these conditions
-    bool compares;    ///< valid, and it knows the concentration of the ice: a run is held against it
+    bool compares;    ///< valid, and it knows the concentration of the ice: a run is held against it. Not where the body
+                      ///< all but stands still, and the force depends on its speed
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;
 

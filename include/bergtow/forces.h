@@ -4,7 +4,7 @@
 // One law, one entry (bt_force_law), one function that says what the law does to a body: it adds to the load of the
 // body (bt_load). How a load is integrated stands in one place (src/force/load.h), and whatever needs the forces goes
 // through the same table: the prediction U*, the record of the towed body, the rest of floes, free drift, the
-// undisturbed ice of a moving window, the guards. A force can so not be in one of them and missing in another.
+// undisturbed ice, the guards. A force can so not be in one of them and missing in another.
 // Rejected: a law as a function from velocity to force. An explicit drag reverses the relative velocity where Δt K > M,
 // and Newton's method of free drift and the exact circles of Coriolis need to know what is linear, quadratic or a
 // rotation.
@@ -103,8 +103,9 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
     l->jy += g * v;
 }
 
-/// A body as a law sees it: one of the world, or the undisturbed ice of a moving window (step/window.h), a mean floe
-/// that stands nowhere: its place is NaN, so that a law which depends on the place and forgets it is found at once.
+/// A body as a law sees it: one of the world, or undisturbed ice (step/undisturbed.h), a mean floe that stands nowhere:
+/// its place is NaN, so that a law which depends on the place and forgets it is found at once where a moving window takes
+/// such ice in; elsewhere it counts as going with the water, in the speed through the ice.
 typedef struct bt_force_body {
     const bt_params *par;      ///< Δt, current, wind of the step
     const double *own;         ///< numbers of the law

@@ -101,7 +101,7 @@ static void print_line(const bt_case *c)
                "and sag are not simulated\n",
                1e3 * c->tow.line.diameter, rope.mass, rope.stiffness, rope.breaking, rope.source);
     printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n",
-           bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
+           bt_case_line_period(c), bt_case_steepest_ramp(c), BT_RAMP_PERIODS,
            bt_case_start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;

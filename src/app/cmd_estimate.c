@@ -2,6 +2,7 @@
 // bergtow estimate: the published estimates of the resistance for a case, without simulating it.
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "case/arch.h"
 #include "case/case_derived.h"
 #include "app/cmd.h"
 #include "force/environment.h"
@@ -55,12 +56,14 @@ static void print_table(const options *o, const bt_case *c, const bt_estimate_in
     bt_estimates_print(in, NAN, "", true);
 }
 
-/// Ice drifts with wind and water as it does at the start, where neither changes; else with the water.
+/// Ice drifts with wind and water as it does at the start, where neither changes; else with the water, and so does loose
+/// ice between walls, which begins at rest.
 static void order_speeds(const bt_case *c, bt_estimate_input *in)
 {
     bt_estimate_input ordered;
     double ice[2], body[2];
-    if (bt_environment_changes(c)) return;
+    const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
+    if (bt_environment_changes(c) || (walls && in->concentration < BT_BOUND_CONCENTRATION)) return;
     bt_setup_drift(c, 2 * in->floe_radius, in->thickness, ice, body);
     bt_estimate_ordered(c, ice, &ordered);
     in->speed = ordered.speed;

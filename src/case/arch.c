@@ -29,7 +29,9 @@ static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double
 {
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
-    const double ahead = course - c->body.yaw, across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
+    // at a set speed a body keeps its yaw; on a line it follows its course
+    const double ahead = (c->tow.mode == BT_TOW_SPEED ? course : c->tow.direction) - c->body.yaw,
+                 across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
     const bool open = p->kind == BT_BOUND_OPEN;
     bt_arch a = {.key = p->key,
                  .concentration = concentration,
@@ -62,10 +64,14 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
     const pair pairs[2] = {{c->domain.sides, c->domain.width, "domain.width", "open sides"},
                            {c->domain.ends, c->domain.length, "domain.length", "open ends"}};
     const int legs = c->tow.n_waypoints > 0 ? c->tow.n_waypoints : 1;
+    const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
+    double begins = 0; // of the leg, m: of the first from the body, which rounding of corners leaves out
     bt_arch worst = {.key = NULL};
-    for (int leg = 0; leg < legs; leg++) {
+    for (int leg = 0; leg < legs && (leg == 0 || begins < way); leg++) {
         const double *q = c->tow.waypoints + 2 * leg;
         const double course = leg == 0 ? c->tow.direction : bt_atan2(q[1] - q[-1], q[0] - q[-2]);
+        if (c->tow.n_waypoints > 0)
+            begins += leg == 0 ? bt_hypot(q[0] - c->body.x, q[1] - c->body.y) : bt_hypot(q[0] - q[-2], q[1] - q[-1]);
         for (int k = 0; k < 2; k++) {
             if (fabs(k ? bt_cos(course) : bt_sin(course)) >= BT_ARCH_ALONG) continue; // that pair is ahead and astern
             const bt_arch a = beside_tow(c, &pairs[k], course, concentration, floe_size);

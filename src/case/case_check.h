@@ -45,6 +45,9 @@ double bt_case_line_period(const bt_case *c);
 /// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a
 /// line)?
 bool bt_case_start_is_slow(const bt_case *c);
+/// Time that the tow takes to its speed at its steepest rise, s: the ramp; of a programme that of a ramp as steep. A
+/// programme that begins with a speed begins with a jerk: 0.
+double bt_case_steepest_ramp(const bt_case *c);
 /// Report a start that is not.
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
 

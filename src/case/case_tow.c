@@ -142,9 +142,7 @@ double bt_case_line_period(const bt_case *c)
     return isfinite(period) ? period : 0;
 }
 
-/// Time that the tow takes to its speed at its steepest rise, s: the ramp; of a programme that of a ramp as steep. A
-/// programme that begins with a speed begins with a jerk: 0.
-static double steepest_ramp(const bt_case *c)
+double bt_case_steepest_ramp(const bt_case *c)
 {
     const double *p = c->tow.programme;
     if (c->tow.n_programme == 0) return c->tow.ramp;
@@ -157,13 +155,13 @@ static double steepest_ramp(const bt_case *c)
 
 bool bt_case_start_is_slow(const bt_case *c)
 {
-    return steepest_ramp(c) >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
+    return bt_case_steepest_ramp(c) >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
 }
 
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
     if (bt_case_start_is_slow(c)) return;
-    const double period = bt_case_line_period(c), ramp = steepest_ramp(c);
+    const double period = bt_case_line_period(c), ramp = bt_case_steepest_ramp(c);
     if (c->tow.n_programme > 0)
         bt_errors_add(warnings,
                       "tow.programme: a rise as steep as from 0 to %.4g m/s in %.4g s is short for a body that swings "

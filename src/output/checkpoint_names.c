@@ -135,6 +135,8 @@ static const row rows[] = {
     {"window/drift_y", "m", "way of the undisturbed ice, y", "one"},
     {"window/vel", "m/s, m/s, rad/s, 1", "velocity of the undisturbed ice, x, y, turning; the last is unused",
      "one motion"},
+    {"window/most", "m", "largest way of the body through undisturbed ice, along the tow", "one"},
+    {"window/overtaken", "m", "by how much it fell behind that, at most", "one"},
     {"window/renewed", "1", "floes renewed in all", "one"},
     {"window/kept", "1", "floes that went round as they were, in all", "one"},
     {"window/missed", "1", "places ahead that stayed empty, in all", "one"},

@@ -22,7 +22,7 @@ void bt_stall_add(bt_stall *s, double asked, double dt, const double at[2], doub
     s->pull += pull * dt;
     if (s->asked < path) return;
     const double way = bt_hypot(at[0] - s->from_x, at[1] - s->from_y);
-    if (way < BT_STALL_SHARE * s->asked && s->ice > 0 && s->ice >= BT_STALL_HELD * s->pull) {
+    if (way < BT_STALL_SHARE * s->asked && s->pull > 0 && s->ice >= BT_STALL_HELD * s->pull) {
         s->windows++;
         s->time += s->spent;
     }

@@ -75,6 +75,8 @@ static const bt_state_row window_rows[] = {
     WINDOW(I64, 1, missed),  WINDOW(I64, 1, waiting),     WINDOW(I64, 1, renewed_now),
     WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
 };
+/// Not in checkpoints of before: then from here on.
+static const bt_state_row overtaken_rows[] = {WINDOW(F64, 1, most), WINDOW(F64, 1, overtaken)};
 
 /// Under the name of the window where there is one, as in checkpoints of before the ice was followed without it.
 #define UNDISTURBED(width, member) MEMBER(bt_undisturbed, #member, F64, width, member)
@@ -447,6 +449,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->window) bt_snapshot_add_rows(s, "window", overtaken_rows, N_OF(overtaken_rows), w->window);
     if (w->undisturbed)
         bt_snapshot_add_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
@@ -518,6 +521,8 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->window && bt_snapshot_find(s, "window/most"))
+        bt_snapshot_take_rows(s, "window", overtaken_rows, N_OF(overtaken_rows), w->window);
     // A checkpoint of before it was followed without a window: from here on, as it began.
     if (w->undisturbed && (w->window || bt_snapshot_find(s, "undisturbed/vel")))
         bt_snapshot_take_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);

@@ -223,7 +223,7 @@ static void check_tow(const bt_world *w, bt_snapshot *s)
 static void check_window(const bt_world *w, bt_snapshot *s)
 {
     const bt_window *v = w->window;
-    const double real[] = {v->start, v->rear};
+    const double real[] = {v->start, v->rear, v->most, v->overtaken};
     bt_snapshot_want(
         s,
         bt_state_finite(real, sizeof real / sizeof *real) && bt_state_finite(v->dropped, 3) &&

@@ -197,7 +197,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
     warn_of_events(s, t->events);
-    bt_summary_window_warn(&s->warnings, t->window, t->undisturbed);
+    bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_errors_add(&s->warnings,
                       "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
@@ -216,6 +216,7 @@ static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_tota
     if (adrift) {
         in->speed = in->along = in->water_speed = in->water_along = NAN;
     } else if (isfinite(ice[0]) && !isnan(in->along)) {
+        in->ordered += ice[0] - water[0]; // less the drift of the ice past the water, as it was
         in->along = ice[0], in->speed = bt_hypot(ice[0], ice[1]);
         in->water_along = water[0], in->water_speed = bt_hypot(water[0], water[1]);
     }

@@ -14,18 +14,17 @@ void bt_summary_window_print(const bt_window *v)
            bt_window_laps(v), (long long)v->renewed, (long long)v->kept, (long long)v->missed, (long long)v->waiting);
 }
 
-void bt_summary_window_warn(bt_errors *warnings, const bt_window *v, const bt_undisturbed *ice)
+void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
 {
     if (!v) return;
     const double laps = bt_window_laps(v), places = (double)(v->renewed + v->missed),
                  floes = (double)(v->renewed + v->kept);
-    const double carried = v->sign * ice->drift_x;
-    if (carried > 0 && carried >= v->rear - v->start)
+    if (v->overtaken > v->stride)
         bt_errors_add(warnings,
-                      "wind or current carried the ice %.3g m ahead and the moving window went %.3g m: the ice that "
-                      "overtook the body was that of the window once more, which renews it ahead only; set "
-                      "domain.ends: periodic or open, or tow faster",
-                      carried, v->rear - v->start);
+                      "ice overtook the body, which fell %.3g m back through it: wind, current or tide carried the ice "
+                      "faster than the tow, and what came from behind was the ice of the window once more, which is "
+                      "renewed ahead only; set domain.ends: periodic or open, or tow faster",
+                      v->overtaken);
     if (laps > 1)
         bt_errors_add(warnings,
                       "the moving window has gone %.2f times its length: the body meets the same field again after "

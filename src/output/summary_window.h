@@ -6,6 +6,6 @@
 #include "step/window.h"
 
 void bt_summary_window_print(const bt_window *v);
-void bt_summary_window_warn(bt_errors *warnings, const bt_window *v, const bt_undisturbed *ice);
+void bt_summary_window_warn(bt_errors *warnings, const bt_window *v);
 
 #endif

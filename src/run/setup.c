@@ -16,6 +16,7 @@
 #include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
+#include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
 #include "run/setup_tow.h"
@@ -436,7 +437,9 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
-    const bool held[2] = {c->domain.ends == BT_BOUND_WALL, c->domain.sides == BT_BOUND_WALL};
+    const bool dense = f->concentration >= BT_BOUND_CONCENTRATION, moving = c->domain.ends == BT_BOUND_MOVING;
+    const bool held[2] = {dense && c->domain.ends == BT_BOUND_WALL,
+                          (dense || moving) && c->domain.sides == BT_BOUND_WALL};
     if (with_body) bt_undisturbed_create(w, r->n_floes, held);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);

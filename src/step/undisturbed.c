@@ -60,7 +60,10 @@ void bt_undisturbed_advance(bt_world *w)
         .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
     bt_force_body mean = {
         .drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
-    bt_vel u = v->mass > 0 ? bt_forces_drift(w, &mean) : (bt_vel){.x = w->par.water_u, .y = w->par.water_v};
+    const bt_vel water = {.x = w->par.water_u, .y = w->par.water_v};
+    bt_vel u = v->mass > 0 ? bt_forces_drift(w, &mean) : water;
+    // A law that depends on the place. The ice that a window takes in has none, and the run ends.
+    if (!w->window && !(isfinite(u.x) && isfinite(u.y))) u = water;
     u.w = 0;
     if (v->held[0]) u.x = 0;
     if (v->held[1]) u.y = 0;

@@ -2,7 +2,9 @@
 // Ice that no body disturbs: the mean floe of the field, in free drift from the velocity at which the field begins.
 //
 // The moving window takes in ice that drifts so (step/window.h), and the speed of the towed body through the ice is
-// relative to it (output/observe.c). Between walls ice has nowhere to drift across them, and rests.
+// relative to it (output/observe.c). Between walls dense ice has nowhere to drift, and rests; loose ice drifts until it
+// has packed at one of them, which the mean floe knows nothing of. The mean floe stands nowhere, so a force law that
+// depends on the place gives it no velocity; without a window it then goes with the water.
 #ifndef BERGTOW_UNDISTURBED_H
 #define BERGTOW_UNDISTURBED_H
 

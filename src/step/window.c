@@ -42,6 +42,7 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
     *v = (bt_window){.sign = sign, .length = length, .ahead = ahead, .zone = zone, .n_floes = n_floes};
     v->stride = bt_min(STRIDE_SIZES * w->par.size, bt_min(0.25 * zone, length / 16));
     v->start = v->rear = body_at(w) + ahead - length;
+    v->most = sign * (w->tow->travel_x - w->undisturbed->drift_x);
     for (bt_idx i = 0; i < b->n; i++) {
         const double x = b->pose[i].x;
         bt_home *h = &b->home[i];
@@ -328,6 +329,9 @@ void bt_window_begin(bt_world *w)
     bt_window *v = w->window;
     if (!v) return;
     v->renewed_now = 0;
+    const double way = v->sign * (w->tow->travel_x - w->undisturbed->drift_x);
+    v->most = bt_max(v->most, way);
+    v->overtaken = bt_max(v->overtaken, v->most - way);
     const double behind = body_at(w) + v->ahead - v->length - v->rear;
     if (!(behind >= v->stride)) return; // a body that drifts back does not take the window with it
     v->rear += v->stride * floor(behind / v->stride);

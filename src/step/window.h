@@ -36,6 +36,8 @@ typedef struct bt_window {
     bt_gid n_floes;       ///< bodies below this id are renewed
     // state
     double start, rear;   ///< σx of the rear end at first and now, m
+    double most;          ///< the largest way of the body through undisturbed ice so far, along σx, m
+    double overtaken;     ///< by how much it has fallen behind that, at most: ice came past it from behind, m
     int64_t renewed, kept, missed; ///< in all
     int64_t waiting;      ///< floes behind the rear that were not renewed when it last moved
     int64_t renewed_now;  ///< in the last step

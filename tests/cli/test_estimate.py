@@ -284,7 +284,11 @@ def test_ice_that_the_wind_drives_along_is_not_met_at_the_speed_of_the_tow(tmp_p
     # the same without a window: the ice is followed all the same; and before the run, by its free drift at the start
     still = run(tmp_path, changed(DRIVEN, domain__ends="periodic"), name="still")
     assert still.summary["estimates"]["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-3)
-    assert estimate(tmp_path, DRIVEN)["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.02)
+    before = estimate(tmp_path, DRIVEN)
+    assert before["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.02)
+    # the tow keeps the speed that it asks for, whatever the ice does
+    assert e["ordered_speed_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-9)
+    assert before["ordered_speed_m_s"] == before["speed_along_m_s"]
 
 
 def test_a_run_goes_on_with_the_drift_that_it_had(tmp_path):
@@ -308,3 +312,32 @@ def test_no_jam_is_reported_where_no_ice_holds_the_body(tmp_path):
         assert not any("jam" in w for w in r.summary["warnings"]), r.summary["warnings"]
     assert any(e["kind"] == "adrift" for e in r.summary["events"])
     assert r.summary["estimates"]["speed_along_m_s"] is None
+
+
+def test_loose_ice_between_end_walls_drifts_and_dense_ice_does_not(tmp_path):
+    """Red when walls hold all ice: a current along the tow would count as speed through floes that go with it."""
+    walls = {"frame": "geographic", "length": 600, "width": 200, "ends": "wall", "sides": "periodic"}
+    case = changed(DRIVEN, domain=walls, air__wind_x=0, water__current_x=0.2, ice__concentration=0.1, body__x=100)
+    e = run(tmp_path, case, name="loose").summary["estimates"]
+    assert 0.2 < e["speed_along_m_s"] < 0.36 and e["speed_along_m_s"] == pytest.approx(e["ordered_speed_m_s"])
+    dense = changed(case, ice__concentration=0.8, run__duration=120)
+    e = run(tmp_path, dense, name="dense").summary["estimates"]
+    assert e["speed_along_m_s"] == pytest.approx(0.4, rel=1e-9) and e["water_speed_m_s"] == pytest.approx(0.2, rel=1e-9)
+
+
+def test_ice_that_a_tide_carries_past_a_moving_window_is_reported(tmp_path):
+    """Red when the ends of the ways are compared: a tide brings the ice back."""
+    tide = changed(DRIVEN, air__wind_x=0, water={"tide": {"major": 0.8, "period": 800}}, run__duration=800)
+    assert any("ice overtook the body" in w for w in run(tmp_path, tide, name="tide").summary["warnings"])
+    slow = changed(DRIVEN, air__wind_x=0, water={"current_x": 0.1}, run__duration=30, output__window_start=25)
+    assert not any("ice overtook" in w for w in run(tmp_path, slow, name="slow").summary["warnings"])
+
+
+def test_a_body_that_stands_still_is_held_against_no_estimate_of_a_moving_one(tmp_path):
+    """Red when the ratio is formed all the same: it was 1e10 in a jam."""
+    jam = changed(WEAK, ice__concentration=0.8, tow__vessel__bollard_pull=0.3, run__duration=60,
+                  output__window_start=30)
+    e = run(tmp_path, jam).summary["estimates"]
+    assert abs(e["speed_along_m_s"]) < 0.05 * 0.13
+    assert not any(e[k]["compares"] for k in ("lichey_hellmer", "marchenko_momentum", "dilute_limit"))
+    assert e["marchenko_compaction"]["compares"]

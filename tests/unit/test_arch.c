@@ -62,7 +62,16 @@ static void the_extent_across_the_tow_counts(void **state)
     assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.width");
     double turn[] = {5, 0, 5, 30}; // along x, then along y
     c.tow.waypoints = turn, c.tow.n_waypoints = 2;
-    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.length");
+    c.body.x = c.body.y = 0;
+    c.tow.mode = BT_TOW_SPEED, c.tow.speed = 1, c.tow.ramp = 0;
+    c.run.duration = 4; // not as far as the turn
+    assert_string_equal(bt_arch_of(&c, 0.8, 0.5).key, "domain.width");
+    c.run.duration = 6;
+    a = bt_arch_of(&c, 0.8, 0.5);
+    assert_string_equal(a.key, "domain.length");
+    assert_true(fabs(a.bodies - 5) < 1e-12); // it keeps its yaw, and goes broadside on
+    c.tow.mode = BT_TOW_LINE;
+    assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 10) < 1e-12); // on a line it follows
 }
 
 /// The disc of moved ice grows with the way: π (w/2)² δ = way/width, both in body widths.
