@@ -98,8 +98,9 @@ typedef struct bt_estimate {
     double force;     ///< N against the tow; NaN: the formula has no value here
     double low, high; ///< N, its range; equal to force where there is none
     bool valid;       ///< the formula is meant for these conditions
-    bool compares;    ///< valid, and it knows the concentration of the ice: a run is held against it. Not where the body
-                      ///< all but stands still, and the force depends on its speed
+    /// valid, and it knows the concentration of the ice: a run is held against it. Not where the body all but stands
+    /// still and the force depends on its speed
+    bool compares;
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;
 

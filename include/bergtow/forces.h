@@ -104,8 +104,8 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
 }
 
 /// A body as a law sees it: one of the world, or undisturbed ice (step/undisturbed.h), a mean floe that stands nowhere:
-/// its place is NaN, so that a law which depends on the place and forgets it is found at once where a moving window takes
-/// such ice in; elsewhere it counts as going with the water, in the speed through the ice.
+/// its place is NaN, so that a law which depends on the place and forgets it is found at once where a moving window
+/// takes such ice in; elsewhere it counts as going with the water, in the speed through the ice.
 typedef struct bt_force_body {
     const bt_params *par;      ///< Δt, current, wind of the step
     const double *own;         ///< numbers of the law

@@ -56,8 +56,8 @@ static void print_table(const options *o, const bt_case *c, const bt_estimate_in
     bt_estimates_print(in, NAN, "", true);
 }
 
-/// Ice drifts with wind and water as it does at the start, where neither changes; else with the water, and so does loose
-/// ice between walls, which begins at rest.
+/// Ice drifts with wind and water as it does at the start, where neither changes; else with the water, and so does
+/// loose ice between walls, which begins at rest.
 static void order_speeds(const bt_case *c, bt_estimate_input *in)
 {
     bt_estimate_input ordered;
