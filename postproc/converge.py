@@ -274,8 +274,10 @@ def main(argv=None):
     study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, a.jobs, began + 60 * a.budget,
                      began + 60 * a.budget)
     rows = converge(study, a.vary, a.margin, a.tries)
-    with Run(study.path("case", 0)) as run:
-        values = run.case
+    values = None  # of the case: not known where the budget was spent before its first run was through
+    if study.path("case", 0).exists():
+        with Run(study.path("case", 0)) as run:
+            values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,
              "budget_min": a.budget, "looks": LOOKS, "spent_min": (time.monotonic() - began) / 60, "rows": rows}
     findings.keep("converge", found, folder, a.force)

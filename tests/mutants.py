@@ -418,7 +418,6 @@ MUTANTS = {
     "src/output/stall.c": (["unit/test_limit",
                             "cli/test_estimate.py::test_no_jam_is_reported_where_no_ice_holds_the_body"], [
         (" && s->pull > 0 && s->ice >= BT_STALL_HELD * s->pull", "", "a jam without ice"),
-        ("    if (!drawn) return;", "", "a jam of a body that nothing draws"),
         ("s->asked = s->spent = s->ice = s->pull = 0;", "s->asked = s->spent = 0;", "impulses of all windows"),
     ]),
     "src/case/arch.c": (["unit/test_arch"], [

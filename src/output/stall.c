@@ -34,9 +34,6 @@ void bt_stall_step(bt_stall *s, const bt_world *w, double ice, double pull, doub
 {
     const bt_tow *t = w->tow;
     if (!t || t->mode == BT_TOW_NONE || t->mode == BT_TOW_SPEED) return;
-    bool drawn = false;
-    for (int k = 0; k < t->n_branches; k++) drawn = drawn || !t->branch[k].broken;
-    if (!drawn) return;
     bt_stall_add(s, w->par.dt * bt_tow_speed(t, t->time), w->par.dt, (const double[]){t->travel_x, t->travel_y}, ice,
                  pull, path);
 }

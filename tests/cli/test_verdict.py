@@ -126,7 +126,8 @@ def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
         done = call("check", path, "--json")
         assert done.returncode == DONE, done.stderr
         found = json.loads(done.stdout)
-        assert found["domain"] == {"length_m": 1500, "width_m": 400, "sides": "periodic images",
+        assert found["domain"] == {"length_m": 1500, "width_m": 400, "across": "domain.width",
+                                   "sides": "periodic images",
                                    "body_widths": pytest.approx(5, rel=1e-3), "body_widths_needed": widths,
                                    "load_unbounded": c >= 0.75}
         assert len(found["warnings"]) == (widths is not None) + (c >= 0.75) and found["ice"]["concentration"] == c
@@ -134,7 +135,8 @@ def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
         assert found["cost"]["core_time_s"] > 0 and found["cost"]["memory_b"] > 1e6
         assert call("run", path, "-o", "out", "--force", cwd=tmp_path).returncode == DONE
         s = json.loads((tmp_path / "out/summary.json").read_text())
-        assert s["domain"] == {k: found["domain"][k] for k in ("body_widths", "body_widths_needed", "load_unbounded")}
+        said = ("across", "body_widths", "body_widths_needed", "load_unbounded")
+        assert s["domain"] == {k: found["domain"][k] for k in said}
         assert s["n_floes"] == pytest.approx(found["ice"]["floes"], rel=0.1)
         below += widths is not None and s["concentration"] < c
     assert below  # ice as made misses what was asked for in the last digit, and has its rule all the same

@@ -346,6 +346,8 @@ static void a_body_that_met_no_ice_tells_nothing(void **state)
     (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
+    c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
+    c.tow.speed = 0.5;
     bt_run_totals t = totals(600);
     for (int ice = 0; ice < 2; ice++) {
         t.concentration = ice ? 0.2 : 0;
