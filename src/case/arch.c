@@ -65,7 +65,7 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
                            {c->domain.ends, c->domain.length, "domain.length", "open ends"}};
     const int legs = c->tow.n_waypoints > 0 ? c->tow.n_waypoints : 1;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
-    double begins = 0; // of the leg, m: of the first from the body, which rounding of corners leaves out
+    double begins = 0; // way at which the leg begins, m: straight from the body on, corners not rounded
     bt_arch worst = {.key = NULL};
     for (int leg = 0; leg < legs && (leg == 0 || begins < way); leg++) {
         const double *q = c->tow.waypoints + 2 * leg;
