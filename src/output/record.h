@@ -148,7 +148,7 @@ typedef struct bt_frame_line {
 
 /// Numbers of the end of the run that the series do not hold.
 typedef struct bt_run_totals {
-    int64_t n_steps;
+    int64_t n_steps, whole_steps; ///< taken, and of the whole duration
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m

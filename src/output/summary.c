@@ -228,6 +228,10 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     const double nan = NAN;
     *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
     if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
+    else if (t->n_steps < t->whole_steps)
+        bt_errors_add(&s->warnings,
+                      "the run ended after %lld of %lld steps, as it was asked to: `bergtow resume` takes the others",
+                      (long long)t->n_steps, (long long)t->whole_steps);
 
     const bt_mean none = bt_stats_mean(NULL, 0);
     s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;

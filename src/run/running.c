@@ -359,6 +359,7 @@ static void measure_memory(run *r)
 static void total_up(run *r)
 {
     r->totals.n_steps = r->w->step;
+    r->totals.whole_steps = bt_case_steps(r->c);
     r->totals.events = &r->w->events;
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
     r->totals.floes_outside = count_outside(r);
