@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
-// Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a
-// member is finished when it holds a file `finished` (the last thing written: a run that was stopped has a summary too)
-// that its other files fit, failed when it holds failed.txt (first line: exit code; then the reasons; beside the
-// folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line for each start
-// and end, with wall times (null where the process died before it wrote the line; the next call adds that).
-// DIR/ensemble.h5 (src/run/ensemble_file.c) is made anew from the members' files: nothing in it depends on order,
-// ranks, or how often the ensemble was stopped.
+// Folder. DIR/study.resolved.yml says what the members are, DIR/study.files what is in the files that they name
+// (src/run/study_files.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
+// file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed
+// when it holds failed.txt (first line: exit code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where
+// that takes no file), and else waits. DIR/journal.jsonl has a line for each start and end, with wall times (null where
+// the process died before it wrote the line; the next call adds that). DIR/ensemble.h5 (src/run/ensemble_file.c) is
+// made anew from the members' files: nothing in it depends on order, ranks, or how often the ensemble was stopped.
 //
 // Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest
 // (src/run/ensemble_record.h). Each call reads them all and compares them, shared among its ranks, before it begins (as
@@ -19,7 +19,8 @@
 // Who does what. Whoever works on a member holds a lock on members/NAME/lock, which the system releases when the
 // process ends, however it ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed
 // one need no word between them: each takes the next member that is neither finished, failed nor locked, the longest
-// first by an estimate, with a limit of wall time field by field, so that a call that is stopped leaves whole fields.
+// first by an estimate, with a limit of wall time field by field, so that a call that is stopped leaves whole fields,
+// and within a field a Latin hypercube in the order of its conditions, so that it leaves a random sample of them.
 // (Rejected: a counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it
 // on every network.) A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are
 // removed. One whose process died is tried again after all others, and given up
@@ -72,8 +73,9 @@ typedef struct bt_ensemble_options {
 typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_member_state;
 
 /// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another
-/// study, the study asks for more ranks than there are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the
-/// call resumes, or others are at work on the rest); the worst status of a failed member when all others are done.
+/// study, a file that it names has changed, the study asks for more ranks than there are), BT_ERR_IO (also: a member is
+/// not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest); the worst status of a failed member
+/// when all others are done.
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
 
 /// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of

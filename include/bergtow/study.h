@@ -12,7 +12,7 @@
 //     variants:                            # sets of keys that go together, as one more parameter
 //       squares: {ice.shape: rectangles}
 //       hexagons: {ice.shape: polygons, ice.sides: 6}
-//     with:                                # keys that go with a value of a list, as written there
+//     with:                                # keys that go with a value, as written in its list
 //       ice.concentration=0.2: {domain.width: 5 km}
 //     sampling: grid                       # every combination; or latin-hypercube
 //     samples: 100                         # conditions of the Latin hypercube
@@ -20,6 +20,9 @@
 //     seed: 1
 //     fields: own                          # of each condition; common: the same seeds, and so the same ice, in all
 //     ranks: 1                             # MPI ranks that work on one member
+//
+// A key is decided once: not under two of parameters, variants and with, and under `with` for values of one parameter
+// alone; otherwise a member would run with one value and be recorded with another.
 //
 // The keys, with defaults and ranges: src/case/study_keys.c, bergtow --list-keys. Members write no frames unless the
 // study sets output.frame_interval: eighty members of 300,000 floes with the frames of a single run would fill 630 GB.
@@ -65,6 +68,7 @@ typedef struct bt_study_variant {
     char **set;          ///< [n_set] "key=value"
     char **at;           ///< [n_set] where each stands
     int n_set;
+    int axis;            ///< the parameter with this value
 } bt_study_variant;
 
 typedef struct bt_study {

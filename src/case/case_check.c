@@ -52,19 +52,27 @@ static char outside(const bt_case *c, box b, double x, double y)
 
 // ---- defaults that follow from other keys ----
 
-// A file that the case names, relative to the folder of the file in which the key stands, as an absolute path: the
-// resolved file lies elsewhere.
-static void follow_file(const check *k, const char *key, char **file)
+char *bt_case_named_file(const char *from, const char *file)
 {
-    if (!*file || **file == '/') return;
-    char *folder = bt_file_folder(bt_check_file(k, key)), *absolute = realpath(folder, NULL);
-    if (absolute) {
-        char *joined = bt_file_join(absolute, *file);
-        free(*file);
-        *file = joined;
-    }
+    if (*file == '/') return NULL;
+    char *folder = bt_file_folder(from), *absolute = realpath(folder, NULL),
+         *joined = absolute ? bt_file_join(absolute, file) : NULL;
     free(absolute);
     free(folder);
+    return joined;
+}
+
+/// Files that the case names, as absolute paths: the resolved file lies elsewhere.
+static void follow_files(const check *k)
+{
+    for (int i = 0; i < bt_n_case_keys; i++) {
+        if (!bt_case_keys[i].file) continue;
+        char **file = (char **)((char *)k->c + bt_case_keys[i].offset);
+        char *absolute = *file ? bt_case_named_file(bt_check_file(k, bt_case_keys[i].name), *file) : NULL;
+        if (!absolute) continue;
+        free(*file);
+        *file = absolute;
+    }
 }
 
 /// A velocity of which nothing is given stays open where the body drifts freely at the start; otherwise what is not
@@ -102,10 +110,7 @@ static void follow(const check *k)
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
-    follow_file(k, "ice.field", &c->ice.field);
-    follow_file(k, "water.current_table", &c->water.current_table);
-    follow_file(k, "air.wind_table", &c->air.wind_table);
-    follow_file(k, "ice.outlines", &c->ice.outlines);
+    follow_files(k);
 }
 
 // ---- checks ----

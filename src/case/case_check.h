@@ -20,6 +20,10 @@ static inline void bt_check_fill(double *member, double value)
     if (isnan(*member)) *member = value;
 }
 
+/// Absolute path of a file that is named in the file `from`, to whose folder it is relative; NULL where it is absolute,
+/// or that folder is not there.
+char *bt_case_named_file(const char *from, const char *file);
+
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.
 bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
 

@@ -51,6 +51,8 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
     {.name = key, .type = BT_KEY_INT, .preset = preset_, .range = range_, AT(member), .doc = doc_}
 #define BOOL(key, member, preset_, doc_) {.name = key, .type = BT_KEY_BOOL, .preset = preset_, AT(member), .doc = doc_}
 #define TEXT(key, member, preset_, doc_) {.name = key, .type = BT_KEY_TEXT, .preset = preset_, AT(member), .doc = doc_}
+#define PATH(key, member, doc_) \
+    {.name = key, .type = BT_KEY_TEXT, .preset = "none", AT(member), .file = true, .doc = doc_}
 #define CHOICE(key, member, names, preset_, doc_) \
     {.name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .doc = doc_}
 
@@ -155,9 +157,9 @@ bt_key bt_case_keys[] = {
     INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
     REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]",
          "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
-    TEXT("ice.field", ice.field, "none",
+    PATH("ice.field", ice.field,
          "HDF5 field file read instead of making a field; relative to the folder of the case file"),
-    TEXT("ice.outlines", ice.outlines, "none",
+    PATH("ice.outlines", ice.outlines,
          "GeoJSON file of floe outlines (FeatureCollection of Polygons, positions [east, north]; properties thickness "
          "in m and id are optional) read instead of making a field; relative to the folder of the case file"),
     CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "file",
@@ -334,7 +336,7 @@ bt_key bt_case_keys[] = {
          "tidal ellipse: period; the default is that of the constituent M2, 28.9841042 deg an hour"),
     REAL("water.tide.phase", water.tide.phase, ANGLE, "0 deg", "[-360, 360]",
          "tidal ellipse: lag; the current is largest along the major axis at phase / 360 deg x period"),
-    TEXT("water.current_table", water.current_table, "none",
+    PATH("water.current_table", water.current_table,
          "CSV file with the header t,u,v: current along x and y in time, linear between rows, in place of the keys "
          "above; relative to the folder of the case file"),
     REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]",
@@ -348,7 +350,7 @@ bt_key bt_case_keys[] = {
     REAL("air.density", air.density, DENSITY, "1.29 kg/m3", "[0, 10]", "density of the air [Hunke & Comeau 2011]"),
     REAL("air.wind_x", air.wind_x, SPEED, "0 m/s", ANY_SPEED, "wind along x"),
     REAL("air.wind_y", air.wind_y, SPEED, "0 m/s", ANY_SPEED, "wind along y"),
-    TEXT("air.wind_table", air.wind_table, "none",
+    PATH("air.wind_table", air.wind_table,
          "CSV file with the header t,u,v: wind along x and y in time, linear between rows, in place of the keys above; "
          "relative to the folder of the case file"),
 

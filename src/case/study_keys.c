@@ -21,9 +21,11 @@ const bt_key bt_study_keys[] = {
     ROW("parameters", MAP, "none",
         "keys that are varied, each with a list [0.2, 0.5] or a range {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}, "
         "in a Latin hypercube with a distribution (uniform, triangular; normal: 95 % from ... to) and a source"),
-    ROW("variants", MAP, "none", "names of sets of keys that go together, varied as one more parameter"),
-    ROW("with", MAP, "none", "keys that go with a value of a list, as in "
-        "{ice.concentration=0.2: {domain.width: 5 km}}"),
+    ROW("variants", MAP, "none",
+        "names of sets of keys that go together, varied as one more parameter; none that `parameters` varies"),
+    ROW("with", MAP, "none",
+        "keys that go with a value of a list, as in {ice.concentration=0.2: {domain.width: 5 km}}; none that is varied "
+        "otherwise"),
     CHOICE("sampling", samplings, "grid", "every combination of the values, or a Latin hypercube"),
     WHOLE("samples", "1", "[1, 100000]", "conditions of the Latin hypercube, which needs it"),
     WHOLE("repeats", "1", "[1, 100000]", "fields of each condition"),

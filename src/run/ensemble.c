@@ -20,6 +20,7 @@
 #include "run/ensemble_journal.h"
 #include "run/ensemble_member.h"
 #include "run/ensemble_record.h"
+#include "run/study_files.h"
 #include "base/fileio.h"
 #include "base/json.h"
 #include "base/launcher.h"
@@ -38,6 +39,9 @@ typedef struct {
     char *folder;
     int64_t turn;  ///< repeat where wall time is limited: a call that is stopped leaves whole fields; otherwise 0
     double cost;   ///< estimated, s of one core
+    /// within a turn the largest comes first: the cost; 0 where wall time is limited and the conditions are a random
+    /// sample: those that are done are to be one, too, and the costly ones alone have another mean
+    double first;
     bool settled;  ///< finished or failed, as far as this process knows
     bool paused;   ///< has done the steps that this call was to do
     int attempts;  ///< starts without an end
@@ -56,6 +60,7 @@ typedef struct {
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded
     bt_member_records records;
+    bt_study_files files; ///< on the first rank of a group
     double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
     bt_errors *err;
 } ensemble;
@@ -98,14 +103,14 @@ static double left_of_wall(const ensemble *e)
 
 static bool suspect(const entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }
 
-static int by_cost(const void *a, const void *b)
+static int by_turn(const void *a, const void *b)
 {
     const entry *p = a, *q = b;
     const int doubt[2] = {(p->attempts > 0) + suspect(p), (q->attempts > 0) + suspect(q)};
     if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // those whose process died come last
     if (p->turn != q->turn) return p->turn < q->turn ? -1 : 1;
-    if (p->cost != q->cost) return p->cost > q->cost ? -1 : 1;
-    return strcmp(p->m.name, q->m.name);
+    if (p->first != q->first) return p->first > q->first ? -1 : 1;
+    return p->index < q->index ? -1 : 1;
 }
 
 static void look(entry *x)
@@ -190,6 +195,7 @@ static void make_list(ensemble *e)
 {
     e->n = bt_study_n_members(e->s);
     e->list = bt_alloc((size_t)e->n, sizeof *e->list);
+    const bool limited = e->o->max_wall > 0;
     double cost = 0;
     int64_t priced = -1;
     for (int64_t i = 0; i < e->n; i++) {
@@ -209,12 +215,13 @@ static void make_list(ensemble *e)
             bt_errors_free(&unheard);
         }
         x->cost = cost;
-        x->turn = e->o->max_wall > 0 ? x->m.repeat : 0;
+        x->turn = limited ? x->m.repeat : 0;
+        x->first = limited && e->s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? 0 : cost;
         x->attempts = bt_member_attempts(x->folder);
         look(x);
     }
     check_members(e);
-    qsort(e->list, (size_t)e->n, sizeof *e->list, by_cost);
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_turn);
 }
 
 /// What is settled when the work begins.
@@ -227,35 +234,46 @@ static void count_settled(ensemble *e)
     }
 }
 
-/// Folder, resolved study; refuses a folder of another study. On rank 0.
+/// The folder is of this study, or new; old: which of these. The caller holds its lock.
+static bt_status keep_resolved(const char *dir, const char *text, bool *old, bt_errors *err)
+{
+    char *path = bt_file_join(dir, "study.resolved.yml"), *before = NULL;
+    size_t size;
+    *old = access(path, F_OK) == 0;
+    bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
+    if (status == BT_OK && *old && strcmp(before, text)) {
+        bt_errors_add(err,
+                      "%s: holds the members of another study (see %s): only `repeats` may change; give another "
+                      "folder with -o, or restore the study and its base case",
+                      dir, path);
+        status = BT_ERR_CASE;
+    }
+    free(before);
+    free(path);
+    return status;
+}
+
+/// Folder, resolved study, files that it names; refuses a folder of another study. On rank 0.
 static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
 {
     char *text = bt_study_resolved(s, err);
     if (!text) return BT_ERR_CASE;
-    char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"),
-         *copy = bt_file_join(o->dir, "study.yml");
+    char *members = bt_file_join(o->dir, "members"), *copy = bt_file_join(o->dir, "study.yml");
+    bt_study_files files;
+    bt_errors warnings = {0};
+    bool old = false;
+    bt_study_files_find(&files, s);
     bt_status status = bt_file_make_dir(members, err);
     const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
-    if (status == BT_OK && access(path, F_OK) == 0) {
-        char *before;
-        size_t size;
-        status = bt_file_read(path, "a study", &before, &size, err);
-        if (status == BT_OK && strcmp(before, text)) {
-            bt_errors_add(err,
-                          "%s: holds the members of another study (see %s): only `repeats` may change; give another "
-                          "folder with -o, or restore the study and its base case",
-                          o->dir, path);
-            status = BT_ERR_CASE;
-        }
-        free(before);
-    } else if (status == BT_OK) {
-        status = bt_file_write(path, text, err);
-    }
+    if (status == BT_OK) status = keep_resolved(o->dir, text, &old, err);
+    if (status == BT_OK) status = bt_study_files_keep(&files, o->dir, old, &warnings, err);
     if (status == BT_OK) status = bt_file_write(copy, s->text, err);
     if (fd >= 0) close(fd);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
+    bt_study_files_free(&files);
     free(members);
-    free(path);
     free(copy);
     free(text);
     return status;
@@ -337,9 +355,13 @@ static bool is_for_another(const ensemble *e, const entry *x)
     return e->o->max_steps > 0 && (x->paused || x->index % e->n_groups != e->of_group);
 }
 
-/// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
+enum { NONE = -1, CHANGED = -2 };
+
+/// Take the lock of the next member that is free; NONE, or CHANGED: what it would be made with is not what others were
+/// made with. On the first rank of a group.
 static int64_t claim(ensemble *e)
 {
+    if (bt_study_files_same(&e->files, e->err) != BT_OK) return CHANGED;
     for (int64_t i = 0; i < e->n; i++) {
         entry *x = &e->list[i];
         look(x);
@@ -354,7 +376,7 @@ static int64_t claim(ensemble *e)
         e->lock = fd;
         return i;
     }
-    return -1;
+    return NONE;
 }
 
 /// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts
@@ -454,7 +476,8 @@ static bt_status work(ensemble *e)
         if (stop) return BT_ERR_SIGNAL;
         int64_t i = e->group->rank == 0 ? claim(e) : 0;
         bt_comm_bcast(e->group, &i, sizeof i);
-        if (i == -1) return e->lost > 0 ? BT_ERR_IO : BT_OK;
+        if (i == CHANGED) return BT_ERR_CASE;
+        if (i == NONE) return e->lost > 0 ? BT_ERR_IO : BT_OK;
         const bt_status status = run_member(e, &e->list[i]);
         if (e->group->rank == 0) {
             close(e->lock);
@@ -630,6 +653,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
                   .alone = -1};
     e.threads = threads;
     e.records = records;
+    if (group.rank == 0) bt_study_files_find(&e.files, s);
     make_list(&e);
     if (o->retry && comm->rank == 0) forget_failures(&e);
     if (o->retry) bt_comm_rest(comm);
@@ -673,6 +697,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         free(e.list[i].folder);
     }
     free(e.list);
+    bt_study_files_free(&e.files);
     bt_member_records_end(&e.records);
     return bt_comm_agree(comm, status);
 }

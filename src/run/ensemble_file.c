@@ -283,7 +283,7 @@ static void describe_members(bt_h5 *h)
 {
     static const struct {
         const char *name, *units, *meaning;
-    } columns[] = {{"/members/id", "1", "number of the member in the study, from 0"},
+    } columns[] = {{"/members/id", "1", "number of the member in the study, from 1"},
                   {"/members/condition", "1", "which condition of the study, from 0"},
                   {"/members/repeat", "1", "which field of the condition, from 0"},
                   {"/members/seed", "1", "seed of its field"},
@@ -305,7 +305,7 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
         failed += t->status[m] == BT_MEMBER_FAILED;
     }
     bt_h5_write(h, "/member", H5T_NATIVE_INT64, n, 0, t->id);
-    bt_h5_describe(h, "/member", "member", "1", "number of the member in the study, from 0");
+    bt_h5_describe(h, "/member", "member", "1", "number of the member in the study, from 1");
     bt_h5_group(h, "/members");
     bt_h5_write(h, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
     bt_h5_write(h, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);

@@ -74,7 +74,7 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
             char *given = bt_text_of("%s=%s", s->parameter[p].name, out->value[p]);
             add_override(out, given, s->parameter[p].at);
             for (int i = 0; i < s->n_with; i++)
-                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++)
+                for (int k = 0; s->with[i].axis == p && k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++)
                     add_override(out, bt_text_copy(s->with[i].set[k]), s->with[i].at[k]);
             continue;
         }
@@ -122,7 +122,9 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
         fprintf(out, "%s:", s->parameter[p].name);
         const bt_study_parameter *q = &s->parameter[p];
         if (q->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-            fprintf(out, " %s from %.17g to %.17g", q->logarithmic ? "log" : "linear", q->from, q->to);
+            // studies of earlier versions drew whole numbers otherwise, and are others
+            fprintf(out, " %s%s from %.17g to %.17g", bt_study_is_whole(q) ? "whole numbers, " : "",
+                    q->logarithmic ? "log" : "linear", q->from, q->to);
             // uniform is not named: studies of earlier versions go on
             if (q->distribution != BT_UNIFORM) fprintf(out, ", %s", bt_distribution_name(q->distribution));
         } else

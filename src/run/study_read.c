@@ -13,6 +13,7 @@
 #include "base/tree.h"
 #include "case/case_base.h"
 #include "case/value.h"
+#include "run/study_axes.h"
 
 /// Members write no frames unless the study sets this: what it says comes later, and counts.
 static const char no_frames[] = "output.frame_interval=-1 s";
@@ -159,9 +160,35 @@ static void read_variants(const bt_study_reader *r, const bt_node *map, int line
         char where[96];
         snprintf(where, sizeof where, "variants: %.60s", map->key[i]);
         v->name = bt_text_copy(map->key[i]);
+        v->axis = s->n_parameters - 1;
         p->value[p->n++] = bt_text_copy(v->name);
         read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
+}
+
+/// Parameter of which a `with` names a value, "key=value"; −1 after a complaint.
+static int axis_of(const bt_study_reader *r, int line, const char *name)
+{
+    const bt_study *s = r->s;
+    for (int p = 0; p < s->n_parameters; p++) {
+        const bt_study_parameter *q = &s->parameter[p];
+        const size_t n = strlen(q->name);
+        if (strncmp(name, q->name, n) || name[n] != '=') continue;
+        if (q->key < 0) {
+            bt_study_complain(r, line, "with: %.120s: keys that go with a variant stand under its name in `variants`; "
+                                       "move them there", name);
+            return -1;
+        }
+        if (q->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+            bt_study_complain(r, line, "with: %.120s: %s is drawn from a range, and no condition has just this value; "
+                                       "give a list of its values, or remove what goes with this one", name, q->name);
+            return -1;
+        }
+        for (int v = 0; v < q->n; v++)
+            if (!strcmp(name + n + 1, q->value[v])) return p;
+    }
+    bt_study_complain(r, line, "with: %.120s: is no value of a parameter; write key=value as in the list", name);
+    return -1;
 }
 
 static void read_with(const bt_study_reader *r, const bt_node *map, int line)
@@ -174,20 +201,13 @@ static void read_with(const bt_study_reader *r, const bt_node *map, int line)
     }
     s->with = bt_alloc((size_t)map->n, sizeof *s->with);
     for (int i = 0; i < map->n; i++) {
+        const int axis = axis_of(r, map->key_line[i], map->key[i]);
+        if (axis < 0) continue;
         char where[160];
         snprintf(where, sizeof where, "with: %.120s", map->key[i]);
-        bool known = false;
-        for (int p = 0; p < s->n_parameters; p++)
-            for (int v = 0; v < s->parameter[p].n && !known; v++) {
-                const size_t n = strlen(s->parameter[p].name);
-                known = !strncmp(map->key[i], s->parameter[p].name, n) && map->key[i][n] == '=' &&
-                        !strcmp(map->key[i] + n + 1, s->parameter[p].value[v]);
-            }
-        if (!known)
-            bt_study_complain(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list",
-                              where);
         bt_study_variant *v = &s->with[s->n_with++];
         v->name = bt_text_copy(map->key[i]);
+        v->axis = axis;
         read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
 }
@@ -274,12 +294,12 @@ static void read_entries(const bt_study_reader *r, const bt_node *root)
         bt_errors_add(r->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml",
                       s->path);
     }
+    s->sampling = (bt_sampling)read_choice(r, root, "sampling"); // how values are understood depends on it
     if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->set_at, &s->n_set);
     if ((node = entry(root, "report", &line))) read_report(r, node, line);
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
     if ((node = entry(root, "with", &line))) read_with(r, node, line);
-    s->sampling = (bt_sampling)read_choice(r, root, "sampling");
     s->common_fields = read_choice(r, root, "fields") == 1;
     for (int i = 0; i < s->n_parameters && s->sampling == BT_SAMPLING_GRID; i++)
         if (s->parameter[i].distribution != BT_UNIFORM)
@@ -308,24 +328,10 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
         bt_errors_add(err, "%s: is a case, with a base, and no study; run it with `bergtow run`", path);
     else if (root) read_entries(&r, root);
     bt_tree_free(root);
+    if (err->n == before) bt_study_check_axes(s, err);
     if (err->n == before) count_conditions(&r);
     if (err->n == before && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) bt_study_draw_strata(s);
     return err->n == before ? BT_OK : BT_ERR_CASE;
-}
-
-/// What the study varies, or sets for some members alone, would win over `set`: where that is, NULL = nowhere.
-static const char *varied(const bt_study *s, const char *key)
-{
-    const size_t n = strlen(key);
-    for (int p = 0; p < s->n_parameters; p++)
-        if (!strcmp(s->parameter[p].name, key)) return "parameters";
-    for (int k = 0; k < 2; k++) {
-        const bt_study_variant *v = k ? s->with : s->variant;
-        for (int i = 0; i < (k ? s->n_with : s->n_variants); i++)
-            for (int j = 0; j < v[i].n_set; j++)
-                if (!strncmp(v[i].set[j], key, n) && v[i].set[j][n] == '=') return k ? "with" : "variants";
-    }
-    return NULL;
 }
 
 /// One "key=value" in place of, or beside, what `set` says.
@@ -345,7 +351,7 @@ static void take_override(bt_study *s, const char *text, bt_errors *err)
     const int key = find_key(&r, 0, "", name);
     const bt_node node = {.kind = BT_NODE_SCALAR, .text = (char *)value, .plain = true};
     if (key < 0 || !bt_study_check_value(&r, 0, name, key, &node)) return;
-    const char *where = varied(s, name);
+    const char *where = bt_study_varied(s, name); // that would win over `set`
     if (where) {
         bt_study_complain(&r, 0, "%s: stands under `%s` of %s, which would win; change it there", name, where, s->path);
         return;

@@ -61,6 +61,40 @@ bool bt_study_check_value(const bt_study_reader *r, int line, const char *name, 
     return good;
 }
 
+/// What a text of a list says: the number of a real or whole key, and otherwise the value as it is written back.
+typedef struct {
+    double number;
+    char *text; ///< NULL of a number
+} said;
+
+static said read_said(const bt_key *k, const bt_node *value)
+{
+    bt_case scratch;
+    bt_case_defaults(&scratch);
+    char why[BT_WHY];
+    bt_value_read(k, &scratch, value->text, value->plain, why); // it has been looked at
+    said x = {0};
+    int64_t whole = 0;
+    if (k->type == BT_KEY_REAL) memcpy(&x.number, (const char *)&scratch + k->offset, sizeof x.number);
+    else if (k->type == BT_KEY_INT) memcpy(&whole, (const char *)&scratch + k->offset, sizeof whole);
+    else {
+        bt_text text;
+        bt_text_begin(&text);
+        bt_value_write(k, &scratch, text.out);
+        x.text = bt_text_end(&text);
+    }
+    if (k->type == BT_KEY_INT) x.number = (double)whole;
+    bt_case_free(&scratch);
+    return x;
+}
+
+/// 7 % and 0.07 are the same, whatever the last digit of a conversion.
+static bool same(const said *a, const said *b)
+{
+    if (a->text && b->text) return !strcmp(a->text, b->text);
+    return fabs(a->number - b->number) <= 1e-12 * fabs(a->number);
+}
+
 void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line, bt_study_parameter *p)
 {
     if (list->n == 0) bt_study_complain(r, line, "%s: the list is empty; give at least one value", p->name);
@@ -70,14 +104,22 @@ void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line,
         return;
     }
     p->value = bt_alloc((size_t)list->n, sizeof *p->value);
+    said *value = bt_alloc((size_t)list->n, sizeof *value);
     for (int i = 0; i < list->n; i++) {
-        if (!bt_study_check_value(r, list->item[i]->line, p->name, p->key, list->item[i])) continue;
-        for (int j = 0; j < p->n; j++)
-            if (!strcmp(p->value[j], list->item[i]->text))
-                bt_study_complain(r, list->item[i]->line, "%s: %s stands twice in the list; remove one", p->name,
-                                  p->value[j]);
-        p->value[p->n++] = bt_text_copy(list->item[i]->text);
+        const bt_node *item = list->item[i];
+        if (!bt_study_check_value(r, item->line, p->name, p->key, item)) continue;
+        value[p->n] = read_said(&bt_case_keys[p->key], item);
+        int twin = 0;
+        while (!same(&value[twin], &value[p->n])) twin++;
+        if (twin < p->n && !strcmp(p->value[twin], item->text))
+            bt_study_complain(r, item->line, "%s: %s stands twice in the list; remove one", p->name, item->text);
+        else if (twin < p->n)
+            bt_study_complain(r, item->line, "%s: %s and %s are the same value; remove one", p->name, p->value[twin],
+                              item->text);
+        p->value[p->n++] = bt_text_copy(item->text);
     }
+    for (int i = 0; i < p->n; i++) free(value[i].text);
+    free(value);
 }
 
 static const char *const distributions[] = {"uniform", "triangular", "normal", NULL};
@@ -104,19 +146,34 @@ static double quantile(bt_distribution d, double u)
     return 0.5 * (1 + low / ends_at);
 }
 
+static double between(double from, double to, bool logarithmic, double at)
+{
+    if (at == 0) return from;
+    if (at == 1) return to;
+    return logarithmic ? from * bt_pow(to / from, at) : from + at * (to - from);
+}
+
 /// Value at a place of a range, 0 ... 1 between its ends, in SI with all its digits.
 static char *range_value(const bt_study_parameter *p, double at)
 {
-    double x = p->logarithmic ? p->from * bt_pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
-    if (at == 0) x = p->from;
-    if (at == 1) x = p->to;
-    if (bt_case_keys[p->key].type == BT_KEY_INT) return bt_text_of("%.0f", nearbyint(x));
+    const double x = between(p->from, p->to, p->logarithmic, at);
+    if (bt_study_is_whole(p)) return bt_text_of("%.0f", nearbyint(x));
     for (int digits = 6; digits < 17; digits++) { // 0.3, not 0.30000000000000004, where nothing is lost
         char *text = bt_text_of("%.*g", digits, x);
         if (fabs(strtod(text, NULL) - x) <= 1e-12 * fabs(x)) return text;
         free(text);
     }
     return bt_text_of("%.17g", x);
+}
+
+/// Value below which the share u of what is drawn from a range lies. Each whole number stands for the half below and
+/// above it: rounded between the ends alone, these would come half as often as the others.
+static char *drawn_value(const bt_study_parameter *p, double u)
+{
+    const double at = quantile(p->distribution, u);
+    if (!bt_study_is_whole(p)) return range_value(p, at);
+    const double x = floor(between(p->from - 0.5, p->to + 0.5, p->logarithmic, at) + 0.5);
+    return bt_text_of("%.0f", p->distribution == BT_NORMAL ? x : bt_min(x, p->to)); // u can be rounded to 1
 }
 
 static void read_distribution(const bt_study_reader *r, const bt_node *value, int line, bt_study_parameter *p)
@@ -134,7 +191,7 @@ static bool in_range_of_key(const bt_study_reader *r, int line, const bt_study_p
     if (p->distribution != BT_NORMAL) return true;
     bool good = true;
     for (int k = 0; k < 2 && good; k++) {
-        char *text = range_value(p, quantile(BT_NORMAL, k));
+        char *text = drawn_value(p, k);
         const bt_node node = {.kind = BT_NODE_SCALAR, .text = text, .plain = true};
         char name[160];
         snprintf(name, sizeof name, "%.80s: a normal distribution with 95 %% from %g to %g reaches", p->name, p->from,
@@ -143,6 +200,11 @@ static bool in_range_of_key(const bt_study_reader *r, int line, const bt_study_p
         free(text);
     }
     return good;
+}
+
+bool bt_study_is_whole(const bt_study_parameter *p)
+{
+    return p->key >= 0 && bt_case_keys[p->key].type == BT_KEY_INT;
 }
 
 char *bt_study_distribution(const bt_study_parameter *p)
@@ -210,6 +272,11 @@ void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line,
     else if (good && in_range_of_key(r, line, p)) {
         p->value = bt_alloc((size_t)n, sizeof *p->value);
         for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
+        int i = 1;
+        while (r->s->sampling == BT_SAMPLING_GRID && i < p->n && strcmp(p->value[i - 1], p->value[i])) i++;
+        if (r->s->sampling == BT_SAMPLING_GRID && i < p->n)
+            bt_study_complain(r, line, "%s: %d values from %.6g to %.6g have %s more than once%s; lower n", p->name, p->n,
+                              p->from, p->to, p->value[i], bt_study_is_whole(p) ? ", as they are whole numbers" : "");
     }
 }
 
@@ -258,7 +325,7 @@ char *bt_study_value(const bt_study *s, int p, int64_t c)
         bt_rng r = draw(s, p, c);
         bt_rng_bits(&r); // the first was for the stratum
         const double at = ((double)q->stratum[c] + bt_rng_uniform(&r)) / (double)s->n_conditions;
-        if (q->continuous) return range_value(q, quantile(q->distribution, at));
+        if (q->continuous) return drawn_value(q, at);
         const int i = (int)(at * q->n);
         return bt_text_copy(q->value[i < q->n ? i : q->n - 1]);
     }

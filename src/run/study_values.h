@@ -30,6 +30,9 @@ bool bt_study_check_value(const bt_study_reader *r, int line, const char *name, 
 void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line, bt_study_parameter *p);
 void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line, bt_study_parameter *p);
 
+/// Does the parameter take whole numbers alone?
+bool bt_study_is_whole(const bt_study_parameter *p);
+
 /// Name of a distribution as a study writes it.
 const char *bt_distribution_name(bt_distribution d);
 

@@ -111,6 +111,26 @@ def test_a_limit_of_wall_time_leaves_whole_fields(quiet, tmp_path):
     assert [c for c, _ in costly] != [c for c, _ in fields] and costly[0][0] == costly[1][0] == costly[2][0]
 
 
+def test_a_limit_of_wall_time_leaves_a_fair_sample_of_a_hypercube(tmp_path):
+    """Whatever its conditions cost: where the time ends, the costly ones alone would have another mean. Without a limit
+    nothing is left out, and the costly ones come first."""
+    hypercube = {
+        "base": "base.yml", "sampling": "latin-hypercube", "samples": 12, "repeats": 2,
+        "parameters": {"ice.concentration": {"from": 0.1, "to": 0.7}}
+    }
+    started = []
+    for folder, limit in (("free", []), ("limited", ["--max-wall", 1000])):
+        (tmp_path / folder).mkdir()
+        prepare(tmp_path / folder, hypercube)
+        assert ensemble(tmp_path / folder, "all", *limit).returncode == DONE
+        started.append([e["member"] for e in journal(tmp_path / folder) if e["event"] == "start"])
+    free, limited = started
+    assert limited == [f"c{c:03d}-r{r:03d}" for r in (1, 2) for c in range(1, 13)]
+    with h5py.File(tmp_path / "free/all/ensemble.h5") as f:
+        ice = dict(zip(f["members/name"].asstr()[:], f["parameters/ice.concentration"][:]))
+    assert [ice[m] for m in free] == sorted(ice.values(), reverse=True) and sorted(limited) == sorted(free)
+
+
 def test_values_in_place_of_those_of_the_study(tmp_path):
     prepare(tmp_path, STUDY | {"repeats": 1})
     given = ("--set", "run.duration=10", "--set", "output.frame_interval=5")

@@ -137,10 +137,50 @@ static void common_fields_are_the_same_in_every_condition(void **state)
     }
 }
 
+/// Conditions of a hypercube of 700 over the corners of floes, 3 to 9, that have so many.
+static void count_corners(const char *how, int n[33])
+{
+    char *text;
+    assert_true(asprintf(&text, "base: a.yml\nsampling: latin-hypercube\nsamples: 700\nparameters:\n  ice.sides: "
+                                "{from: 3, to: 9, n: 40, %s}\n", how) > 0);
+    bt_study s = read_text(text);
+    free(text);
+    for (int64_t c = 0; c < 700; c++) {
+        bt_member m;
+        bt_study_member(&s, c, &m);
+        const int corners = atoi(m.value[0]);
+        assert_true(corners >= 0 && corners <= 32);
+        n[corners]++;
+        bt_member_free(&m);
+    }
+    bt_study_free(&s);
+}
+
+/// Share of a triangular distribution below k of its seven whole numbers.
+static double peaked_below(int k) { return k < 4 ? 2. * k * k / 49 : 1 - 2. * (7 - k) * (7 - k) / 49; }
+
+static void whole_numbers_are_drawn_as_often_as_their_share(void **state)
+{
+    (void)state;
+    int even[33] = {0}, logarithmic[33] = {0}, peaked[33] = {0}, sum = 0;
+    count_corners("distribution: uniform", even);
+    count_corners("scale: log", logarithmic);
+    count_corners("distribution: triangular", peaked);
+    for (int k = 3; k <= 9; k++) {
+        assert_int_equal(even[k], 100);
+        // each end of a share lies within a stratum
+        assert_true(fabs(logarithmic[k] - 700 * log((k + 0.5) / (k - 0.5)) / log(9.5 / 2.5)) < 2);
+        assert_true(fabs(peaked[k] - 700 * (peaked_below(k - 2) - peaked_below(k - 3))) < 2);
+        sum += peaked[k];
+    }
+    assert_int_equal(sum, 700);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once),
                                        cmocka_unit_test(common_fields_are_the_same_in_every_condition),
-                                       cmocka_unit_test(hypercube_has_one_sample_in_each_stratum)};
+                                       cmocka_unit_test(hypercube_has_one_sample_in_each_stratum),
+                                       cmocka_unit_test(whole_numbers_are_drawn_as_often_as_their_share)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
