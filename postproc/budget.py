@@ -9,10 +9,7 @@ The study is a Latin hypercube (`sampling`, `samples`) with fields of its own fo
 converge` on the base case (`--converge FILE`, or converge.json in DIR), from the value on that the study runs with.
 """
 import argparse
-import os
 import re
-import subprocess
-import time
 from pathlib import Path
 
 import command  # first: it has words for packages that are missing
@@ -22,7 +19,7 @@ import loads
 import stat_budget
 import stat_load
 from bergtow_read import RunError
-from case_runs import STOPPED, program
+from case_runs import program, run_members
 from ensemble_read import Ensemble
 from text_table import hours_text
 
@@ -31,24 +28,6 @@ import numpy as np
 
 BUDGET = 15.0  # min
 OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
-
-
-def run(binary, study, folder, sets, jobs, minutes):
-    """Run the members that are left, with several calls at work on the folder. Errors: RunError."""
-    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--quiet", "--max-wall",
-            f"{60 * minutes:.0f}", *(w for t in sets for w in ("--set", t))]
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    # the first one makes the folder and says what is wrong with the study
-    calls = [subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment)]
-    while jobs > 1 and not (folder / "ensemble.h5").exists() and calls[0].poll() is None:
-        time.sleep(0.05)
-    calls += [subprocess.Popen([*call, "--no-wait"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                               env=environment) for _ in range(jobs - 1) if calls[0].poll() is None]
-    ends = [(c.communicate()[1], c.returncode) for c in calls]
-    said, code = ends[0]
-    if code not in (0, STOPPED) and not (folder / "ensemble.h5").exists():
-        line = (said.strip().splitlines() or [f"bergtow ensemble ended with exit code {code}"])[0]
-        raise RunError(study, line.removeprefix("bergtow: "), "mend it")
 
 
 def assumed(e):
@@ -175,7 +154,7 @@ def main(argv=None):
     a = p.parse_args(argv)
     folder = a.output or Path("out") / a.study.stem
     findings.begin("budget", a.study, "study", folder, a.force)
-    run(program(), a.study, folder, a.set, a.jobs, a.budget)
+    run_members(program(), a.study, folder, a.set, a.jobs, 60 * a.budget)
     e = Ensemble(folder)
     findings.keep("budget", of_all(e, a.of or those_there(e), read_converge(a.converge, folder)), folder, a.force)
 

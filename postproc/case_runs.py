@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -114,6 +115,32 @@ class CaseRuns:
             with Run(self.path(name, i)) as run:
                 out.append(measure(run))
         return np.array(out, dtype=float)
+
+
+def ensemble_made(folder):
+    """When ensemble.h5 of a folder was made, None where it is not there."""
+    try:
+        return (folder / "ensemble.h5").stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+
+
+def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
+    """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
+    long as it takes). True when all have settled. Errors: RunError where the program refuses the study; a member that
+    fails is none, and the others are gathered as ever."""
+    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
+    call += [part for text in sets for part in ("--set", text)]
+    if np.isfinite(seconds):
+        call += ["--max-wall", f"{max(1.0, seconds):.0f}"]
+    before = ensemble_made(folder)
+    done = subprocess.run(call + ["--quiet"] * quiet, stderr=subprocess.PIPE, text=True,
+                          env=os.environ | {"OMP_NUM_THREADS": "1"})
+    if done.returncode not in (0, STOPPED) and ensemble_made(folder) == before:
+        said = (done.stderr.strip().splitlines() or [f"bergtow ensemble ended with exit code {done.returncode}"])[0]
+        raise RunError(study, said.removeprefix("bergtow: "), "mend the case or the study")
+    sys.stderr.write(done.stderr)
+    return done.returncode == 0
 
 
 def above_zero(text):

@@ -302,6 +302,9 @@ def test_what_is_refused(small, tmp_path):
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
     for wrong in ("tow_force:101", "tow_force:0"):
         assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out")
+    # the folder holds another study: its numbers are no answer to this one
+    for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
+        assert "another study" in said(study, *more, out=folder / "out")
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))
