@@ -31,7 +31,7 @@ import report
 from bergtow_read import Run, RunError
 from case_file import contents, files, is_study, says, section
 from case_runs import above_zero, program, run_members
-from domain_width import reads_ice
+from domain_width import read_ice_of, reads_ice
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
 from report_case import TITLE_BLOCK
@@ -140,6 +140,10 @@ def more_fields(left, rate, replay, n, most):
 
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
+    if reads_ice(case) and a.fields > 1:
+        print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
+              "fields")
+        a.fields = 1
     n = min(FIRST, a.fields)
     wider = widths(work, a, case)
     for c, width in wider.items():
@@ -190,7 +194,7 @@ def make_replay(work, a, left):
     if m is None:
         return
     with Run(e.folder(m)) as run:
-        if reads_ice({"ice": {k.split(".", 1)[1]: v for k, v in run.case.items() if k.startswith("ice.")}}):
+        if read_ice_of(run.case):
             return
         takes = run.number("wall_time_s")
         if takes > left:
