@@ -239,27 +239,15 @@ def study_text(e):
 
 
 def provenance(e):
-    """(rows of the first member, sentence on members of other builds or None)."""
-    rows, builds = [], {}
+    """Rows of the first member that can be read."""
     for m in np.flatnonzero(e.status == FINISHED):
         try:
             with Run(e.folder(m)) as run:
-                build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
-                builds[build] = builds.get(build, 0) + 1
-                rows = rows or [(name, value)
-                                for name, value in report_run.provenance(run)
-                                if name not in ("state hash", "wall time", "folder", "started", "host")]
+                return [(name, value) for name, value in report_run.provenance(run)
+                        if name not in ("state hash", "wall time", "folder", "started", "host")]
         except RunError:
             continue
-    said = []
-    if len(builds) > 1:
-        of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
-        said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
-                    f"({of}).")
-    if any(str(build[1]).endswith("-dirty") for build in builds):
-        said.append("The program was built from sources with changes that no revision holds: its results cannot be "
-                    "made again from the revision alone.")
-    return rows, " ".join(said) or None
+    return []
 
 
 def caption(name):
@@ -387,7 +375,7 @@ def context(folder, place=None, given=None, also=()):
     if s["holes"]:
         print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
-    (rows, other_builds), rows_of = provenance(e), members(e, s)
+    rows, rows_of = provenance(e), members(e, s)
     values, texts, attributes = first_run(e)
     values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
               for v in varied(e, values)]
@@ -400,7 +388,7 @@ def context(folder, place=None, given=None, also=()):
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
         "answer": answer(e, s, case, results),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
-        "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
+        "warnings": [scrubbed(w) for w in warned],
         "method": report_method.method(s, case), "limits": report_method.limits(case, statement.unbounded(e, e.used)),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],

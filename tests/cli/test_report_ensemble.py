@@ -201,13 +201,14 @@ def test_members_of_other_builds_and_lost_folders_are_reported(study):
         f.attrs["revision"] = "other"
     made_up.record(study / "members/c001-r001", Ensemble(study).study)
     e = Ensemble(study)
-    assert "2 builds" in report_ensemble.provenance(e)[1]
+    assert "2 builds" in e.builds
+    assert "2 builds" in " ".join(report_ensemble.context(study)["warnings"])
     (study / "members/c001-r002").rename(study / "members/lost")
     assert "cannot be read" in report_ensemble.reported(e, 1)[0]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
-    assert report_ensemble.provenance(Ensemble(study))[1] is None
+    assert not Ensemble(study).builds
 
 
 def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeypatch):
