@@ -339,12 +339,12 @@ def main(argv=None):
     if search.say:
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
-    unit = case.get(a.search, "").partition(" ")[2]
+    unit, across = case.get(a.search, "").partition(" ")[2], (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
     found = {
-        "case": a.case.name, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
-        "range": [start, end], "resolution": resolution, "for": (a.conditions or "").partition("=")[0],
-        "for_unit": case.get((a.conditions or "").partition("=")[0], "").partition(" ")[2],
+        "case": a.case.name, "values": {k: v for k, v in case.items() if k not in (a.search, across)}, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
+        "range": [start, end], "resolution": resolution, "for": across,
+        "for_unit": case.get(across, "").partition(" ")[2],
         "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]

@@ -12,6 +12,7 @@ import sys
 from dataclasses import replace
 from itertools import groupby
 
+import compared
 import ensemble
 import ensemble_text
 import findings
@@ -308,11 +309,29 @@ NOT_STUDIED = {
 }
 
 
-def results_beside(folders):
-    """{name: what a command of findings.py left in the first of the folders that has it}."""
-    found = {name: next((f for f in (findings.read(name, folder) for folder in folders) if f is not None), None)
-             for name in findings.KINDS}
-    return {name: f for name, f in found.items() if f is not None}
+def doubt(name, found, folder, texts):
+    """Why what a command found is not of these members (texts: compared.cases of them), or no longer of the ensemble
+    in its folder; "" where it is. What does not say of what it is has no doubt: the files of earlier programs."""
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    try:
+        why = compared.stale(found, Ensemble(folder)) if name == "budget" else ""
+    except RunError:  # the folder holds what was found alone
+        return ""
+    return f"out of date, {why}: call bergtow budget again" if why else ""
+
+
+def results_beside(e, also):
+    """{name: what a command of findings.py left in the first of the folders that has it, with "doubt"}; folders: that
+    of the ensemble, and others."""
+    texts, out = compared.cases(e), {}
+    for name in findings.KINDS:
+        for folder in (e.path, *also):
+            found = findings.read(name, folder)
+            if found is not None:
+                out[name] = found | {"doubt": doubt(name, found, folder, texts)}
+                break
+    return out
 
 
 def beside(results):
@@ -379,7 +398,7 @@ def context(folder, place=None, given=None, also=()):
     values, texts, attributes = first_run(e)
     values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
               for v in varied(e, values)]
-    case, results = statement.case_of(e, e.used), results_beside([e.path, *also])
+    case, results = statement.case_of(e, e.used), results_beside(e, also)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(texts, attributes, given or {})
