@@ -127,6 +127,21 @@ def case_value(case, key, default=np.nan):
         return default
 
 
+def _legs(x, points, headings):
+    """On which leg of its tow a body is at each place [S, 2]: on the next one as soon as that is nearer, so that a path
+    which crosses itself is followed in order."""
+    lengths = np.append(np.hypot(*np.diff(points, axis=0).T), np.inf)
+    def far(place, k):
+        along = np.clip(np.dot(place - points[k], headings[k]), 0.0, lengths[k])
+        return np.hypot(*(place - points[k] - along * headings[k]))
+    out, k = [], 0
+    for place in x:
+        while k + 1 < len(points) and far(place, k + 1) < far(place, k):
+            k += 1
+        out.append(k)
+    return np.array(out, dtype=int)
+
+
 class Run:
     """The output folder of one run.
 
@@ -283,20 +298,44 @@ class Run:
         return window if np.isfinite(window).all() else None
 
     @property
+    def legs(self):
+        """(points [K, 2], unit vectors [K, 2]) of the ordered tow: where each leg begins, and its heading; the last goes
+        on without end."""
+        pairs = re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", self.case.get("tow.waypoints", ""))
+        points = np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float)
+        if len(points) == 1:
+            heading = self.value("tow.direction", 0.0)
+            return points, np.array([[np.cos(heading), np.sin(heading)]])
+        ways = np.diff(points, axis=0)
+        return points[:-1], ways / np.hypot(*ways.T)[:, None]
+
+    @property
+    def way(self):
+        """How far the body has come along the ordered tow [S], m, from the first sample on: sway counts nothing, and
+        what drives it back counts against it."""
+        def find():
+            points, headings = self.legs
+            x = np.column_stack([self["body_x"], self["body_y"]])
+            leg = np.zeros(len(x) - 1, dtype=int)
+            if len(headings) > 1:
+                leg = _legs(x[1:], points, headings)
+            return np.append(0.0, np.cumsum(np.sum(np.diff(x, axis=0) * headings[leg], axis=1)))
+        return self._once("way", find)
+
+    def made_good(self, start, end):
+        """Mean speed of the body over ground along the ordered tow between two times, m/s; negative where it is driven
+        back. NaN without a body."""
+        if "body_x" not in self or not end > start:
+            return np.nan
+        first, last = np.interp([start, end], self["time"], self.way)
+        return float((last - first) / (end - start))
+
+    @property
     def speed_made_good(self):
-        """Mean speed of the body over the window, m/s: along the chord of a straight tow, which is not faster for a
-        sway on its line, and along the track of one through way-points. NaN without a window of two samples or a
-        body."""
-        if self.window is None or "body_x" not in self:
+        """That over the window; NaN without a window of two samples."""
+        if self.window is None or np.sum((self["time"] >= self.window[0]) & (self["time"] <= self.window[1])) < 2:
             return np.nan
-        t, (start, end) = self["time"], self.window
-        inside = (t >= start) & (t <= end)
-        x, y, t = self["body_x"][inside], self["body_y"][inside], t[inside]
-        if len(t) < 2:
-            return np.nan
-        straight = self.case.get("tow.waypoints", "none") in ("none", "[]")
-        way = np.hypot(x[-1] - x[0], y[-1] - y[0]) if straight else np.hypot(np.diff(x), np.diff(y)).sum()
-        return float(way / (t[-1] - t[0]))
+        return self.made_good(*self.window)
 
     @property
     def verdict(self):

@@ -9,6 +9,9 @@ look after each trial, and stop when a side is sure at 1 - LEVEL. The mixture is
 in (q, 1]: at q = 1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q
 picks a side by chance; an interval for a fixed number of trials, which looking again and again does not leave valid.
 
+A trial without an outcome, a run that failed, may have failed for what makes a tow fail. So a side is sure only where
+it is whatever these would have been.
+
 Along the value success is taken to be monotonic. Between a value that succeeds and one that fails the middle is tried
 next; one that stays undecided has p near q, and the gaps to both sides of it are narrowed.
 """
@@ -48,6 +51,7 @@ class Point:
     value: float
     good: int = 0
     bad: int = 0
+    failed: int = 0      #: trials without an outcome
     spent: bool = False  #: no more trials there
 
     @property
@@ -73,7 +77,13 @@ class Bracket:
 
     def judged(self, value):
         p = self.point(value)
-        return verdict(p.good, p.bad, self.share)
+        return self.verdict(p.good, p.bad, p.failed)
+
+    def verdict(self, good, bad, failed):
+        """YES or NO where it is sure whatever the trials without an outcome would have been."""
+        if verdict(good, bad + failed, self.share) == YES:
+            return YES
+        return NO if verdict(good + failed, bad, self.share) == NO else OPEN
 
     def more(self, value):
         """Is the value undecided, and may more trials decide it?"""
@@ -90,6 +100,26 @@ class Bracket:
             near = min(yes + no, key=lambda v: abs(v - last), default=None)
             return (near if yes else None), (near if no else None)
         return min(((a, b) for a in yes for b in no), key=lambda pair: abs(pair[0] - pair[1]))
+
+    def expected(self, value):
+        """What the ends say of a value if success is monotonic: YES or NO, OPEN between them."""
+        yes, no = self.ends()
+        if yes is None and no is None:
+            return OPEN
+        if yes is not None and no is not None:
+            if (value - yes) * (no - yes) <= 0:
+                return YES
+            return NO if (value - no) * (yes - no) <= 0 else OPEN
+        near, side = (yes, YES) if no is None else (no, NO)
+        open_ends = [v for v in (self.start, self.end) if self.judged(v) == OPEN]
+        return side if all((value - near) * (v - near) <= 0 for v in open_ends) else OPEN
+
+    def against(self):
+        """Points whose trials speak against what the ends say of them."""
+        def other(p):
+            side = self.expected(p.value)
+            return p.good < self.share * p.n if side == YES else side == NO and p.good > self.share * p.n
+        return [p for _, p in sorted(self.points.items()) if p.n and other(p)]
 
     def next(self):
         """The value to try next, None when the search is over."""
@@ -120,8 +150,9 @@ class Bracket:
         rows = sorted((p for p in self.points.values() if p.n), key=lambda p: p.value)
         if len(rows) < 2:
             return np.nan
-        yes, no = self.ends()
-        falls = yes is not None and no is not None and yes < no
+        # by the trials themselves: an end may be undecided, and nothing then is on one of the sides
+        overall = sum(p.good for p in rows) / sum(p.n for p in rows)
+        falls = sum((p.good - overall * p.n) * p.value for p in rows) < 0
         blocks = []  # [share, trials, values]
         for p in rows:
             blocks.append([p.good / p.n, p.n, [p.value]])

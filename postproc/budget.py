@@ -9,10 +9,7 @@ The study is a Latin hypercube (`sampling`, `samples`) with fields of its own fo
 converge` on the base case (`--converge FILE`, or converge.json in DIR), from the value on that the study runs with.
 """
 import argparse
-import os
 import re
-import subprocess
-import time
 from pathlib import Path
 
 import command  # first: it has words for packages that are missing
@@ -22,8 +19,8 @@ import loads
 import stat_budget
 import stat_load
 from bergtow_read import RunError
-from case_runs import STOPPED, program
-from ensemble_read import Ensemble
+from case_runs import program, run_members
+from ensemble_read import FAILED, FINISHED, WAITING, Ensemble, listed
 from text_table import hours_text
 
 import h5py
@@ -31,24 +28,6 @@ import numpy as np
 
 BUDGET = 15.0  # min
 OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
-
-
-def run(binary, study, folder, sets, jobs, minutes):
-    """Run the members that are left, with several calls at work on the folder. Errors: RunError."""
-    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--quiet", "--max-wall",
-            f"{60 * minutes:.0f}", *(w for t in sets for w in ("--set", t))]
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    # the first one makes the folder and says what is wrong with the study
-    calls = [subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment)]
-    while jobs > 1 and not (folder / "ensemble.h5").exists() and calls[0].poll() is None:
-        time.sleep(0.05)
-    calls += [subprocess.Popen([*call, "--no-wait"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                               env=environment) for _ in range(jobs - 1) if calls[0].poll() is None]
-    ends = [(c.communicate()[1], c.returncode) for c in calls]
-    said, code = ends[0]
-    if code not in (0, STOPPED) and not (folder / "ensemble.h5").exists():
-        line = (said.strip().splitlines() or [f"bergtow ensemble ended with exit code {code}"])[0]
-        raise RunError(study, line.removeprefix("bergtow: "), "mend it")
 
 
 def assumed(e):
@@ -117,39 +96,68 @@ def those_there(e):
     return out
 
 
-def numerics(e, converge):
+def numerics(e, converge, texts):
     """What the computation adds to means of an ensemble, as stat_budget.budget takes it; None where nothing is known.
     Refused where converge.json is of another case."""
     if converge is None:
         return None
-    texts = compared.cases(e)
     if why := compared.misfit(converge, texts):
         return {"refused": f"converge.json is of another case, {why}; run `bergtow converge` on the base case"}
     return stat_budget.relative_numerics(converge["rows"], compared.values(e, texts))
 
 
+def fair(e):
+    """Rows of a fair sample of a study that may have been cut short: of each repeat the conditions up to the first that
+    is still to come. Conditions stand in the order of the hypercube, which is random; which of those beyond are done
+    depends on how long they take, and so on the values that they have."""
+    rows = []
+    for r in np.unique(e.repeat):
+        some = np.flatnonzero(e.repeat == r)
+        some = some[np.argsort(e.condition[some])]
+        rows += list(some[:np.argmax(np.append(e.status[some] == WAITING, True))])
+    return np.array(rows, dtype=int)
+
+
+def without_intervals(found):
+    """The same with no interval known."""
+    if not isinstance(found, dict):
+        return found
+    return {k: (np.nan, np.nan) if k.endswith("_95") else without_intervals(v) for k, v in found.items()}
+
+
 def of_ensemble(e, of=OF[0], computed=None):
-    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of means alone. Errors:
+    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of means alone. Where
+    members failed, or have no such number, nobody knows which values are missing, and there are no intervals. Errors:
     RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study")
     if "fields: common" in e.study:
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own")
-    meaning, rows, values = numbers(e, of)
+    meaning, done, values = numbers(e, of)
+    sample = fair(e)
+    there = np.isin(done, sample)
+    rows, values = done[there], values[there]
+    lacking = [e.name[m] for m in sample if m not in rows and e.status[m] == FINISHED and e.name[m] not in e.copies]
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
                                computed if ":" not in of else None)
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
+    failed = e.reasons(FAILED)
+    if failed or lacking:
+        found = without_intervals(found)
     return found | {"title": e.title, "of": of, "units": str(units),
-                    "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n}
+                    "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n,
+                    "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows), "failed": failed,
+                    "without_number": lacking, "copies": e.copies, "builds": e.builds}
 
 
 def of_all(e, some, converge):
     """The budget of the first number, with those of the others as "more"; budget.json."""
-    computed = numerics(e, converge)
+    texts = compared.cases(e)
+    computed = numerics(e, converge, texts)
     first, *more = (of_ensemble(e, of, computed) for of in some)
-    return first | {"more": more}
+    return first | {"more": more, "values": compared.common(texts), **compared.state(e)}
 
 
 def read_converge(path, folder):
@@ -175,9 +183,14 @@ def main(argv=None):
     a = p.parse_args(argv)
     folder = a.output or Path("out") / a.study.stem
     findings.begin("budget", a.study, "study", folder, a.force)
-    run(program(), a.study, folder, a.set, a.jobs, a.budget)
+    run_members(program(), a.study, folder, a.set, a.jobs, 60 * a.budget)
     e = Ensemble(folder)
-    findings.keep("budget", of_all(e, a.of or those_there(e), read_converge(a.converge, folder)), folder, a.force)
+    found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
+    findings.keep("budget", found, folder, a.force)
+    if found["failed"]:
+        raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
+                       "budget is without the values that they have", "mend what made them fail, or narrow the ranges; "
+                       "`bergtow ensemble --retry-failed` tries them again")
 
 
 if __name__ == "__main__":

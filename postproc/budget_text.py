@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The uncertainty budget of budget.py as one table and one picture."""
 from converge_text import percent
+from ensemble_read import listed
 from text_table import number, quantity, scale, table
 
 import numpy as np
@@ -93,10 +94,33 @@ def notes(found):
             " That is little: take the shares as a rough guide, and more conditions for better ones.")
         shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
                 f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
-    left = found["wanted"] - found["members"]
-    missing = f" {left} of {found['wanted']} members are missing." if left else ""
     return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
-            f"{found['members']} tows.{missing} {shares}{numerics_notes(found)}")
+            f"{found['members']} tows. {shares}{numerics_notes(found)}")
+
+
+def warnings(found):
+    """Lines on what is not in the numbers."""
+    wanted, out = found["wanted"], []
+    left = found.get("waiting", wanted - found["members"])
+    if left:
+        beyond = found.get("left_out")
+        out.append(f"{left} of {wanted} members are still to come: this is of the first {found['conditions']} "
+                   "conditions, which are a fair sample, and its intervals are wider than those of the whole study."
+                   + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they are "
+                      "depends on how long a tow takes." if beyond else ""))
+    if failed := found.get("failed"):
+        name, why = next(iter(failed.items()))
+        out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). What made them "
+                   "fail may be what the budget asks for: there are no intervals.")
+    if lacking := found.get("without_number"):
+        out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "
+                   "intervals.")
+    if copies := found.get("copies"):
+        out.append(f"{len(copies)} of {wanted} members are the same run as another one of their condition, and count "
+                   "with it once.")
+    if builds := found.get("builds"):
+        out.append(builds)
+    return [f"WARNING: {line}" for line in out]
 
 
 def text(found, markdown=False):
@@ -107,7 +131,7 @@ def text(found, markdown=False):
 def _text(found, markdown):
     head = ["part", "standard deviation", "of the mean", "share of the variance", "Sobol, first order", "total",
             "range and source"]
-    return table(head, rows(found), markdown) + "\n\n" + notes(found)
+    return "\n\n".join([*warnings(found), table(head, rows(found), markdown), notes(found)])
 
 
 def figure(found):

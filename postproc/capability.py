@@ -5,8 +5,11 @@ which half of the tows no longer make it.
     capability.py CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
     capability.py CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"      the vessel that is enough
 
-A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) in the mean over the
-window and no branch of its line parts. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
+A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) along the ordered tow, in
+the mean over the window and over its last quarter, and no branch of its line parts. The last quarter, because a tow
+that has come to rest in the ice has a mean that only tells for how long it has been there: without it the limit is one
+of run.duration. Rejected: windows in which the body stood still (stalled_windows), since a tow that stops and goes on
+makes it; they are counted beside. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
 line that may part; a prescribed speed is kept whatever it takes. The search is that of bracket.py; what it has tried is
 a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where periodic
 sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
@@ -34,6 +37,7 @@ POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
 PARTS = 16               # the range over the resolution
 STOPPED = 0.1            # of tow.speed: what is slower has stopped
 RANGES = {"ice.concentration": ("0.2", "0.95")}
+LATE = 0.25              # of the window: in which a tow must still keep the speed
 FAILING = 3              # runs that fail at a value before it is given up
 
 
@@ -43,6 +47,8 @@ class Trial:
 
     field: int
     speed: float      #: m/s, mean over the window
+    late: float       #: that over the last quarter of it
+    stood: bool       #: it stood still for a while, held by the ice
     parted: bool
     tow_force: float  #: N, mean
     tension: float    #: N, largest step mean of the window
@@ -50,7 +56,7 @@ class Trial:
     needed: float = np.nan  #: those that the ice asks for, NaN where it asks for none
 
     def made(self, least):
-        return self.speed >= least and not self.parted
+        return min(self.speed, self.late) >= least and not self.parted
 
 
 def trial(run, number):
@@ -62,7 +68,8 @@ def trial(run, number):
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
-    return Trial(number, speed,
+    start, end = run.window
+    return Trial(number, speed, run.made_good(end - LATE * (end - start), end), run.number("stalled_windows") > 0,
                  any(e["kind"] == "line_broken" for e in run.events),
                  run.number("mean_tow_force_n"), run.number("peak_line_tension_n"), widths, needed)
 
@@ -105,7 +112,8 @@ class Search:
         return sets | ({"domain.width": c.wider[value]} if c.wider[value] else {})
 
     def add(self, c, value, n):
-        """n more trials; False where the budget is spent. A run that fails is no trial: another field stands for it."""
+        """n more trials; False where the budget is spent. A run that fails has no outcome: another field is run, and the
+        value is decided where that one could not have changed it."""
         point = c.search.point(value)
         value = point.value
         name, some = self.folder(c, value), c.trials.setdefault(value, [])
@@ -120,6 +128,7 @@ class Search:
                 return False
             if w:
                 failed.append(w)
+                point.failed += 1
                 continue
             with Run(self.runs.path(name, i)) as run:
                 some.append(trial(run, i + 1))
@@ -140,7 +149,7 @@ class Search:
         while (value := s.next()) is not None:
             p = s.point(value)
             sure = next((k for k in range(1, s.most) if bracket.OPEN not in (
-                bracket.verdict(p.good + k, p.bad, s.share), bracket.verdict(p.good, p.bad + k, s.share))), s.most)
+                s.verdict(p.good + k, p.bad, p.failed), s.verdict(p.good, p.bad + k, p.failed))), s.most)
             if not self.add(c, value, max(1, min(self.runs.jobs, sure, s.most - p.n))):
                 c.why = SPENT
                 return
@@ -152,6 +161,10 @@ class Search:
             while c.search.point(value).n < fields and not c.search.point(value).spent:
                 if not self.add(c, value, min(self.runs.jobs, fields - c.search.point(value).n)):
                     return
+        # what speaks against the bracket is decided, or stays as it is where the budget does not reach
+        while p := next((p for p in c.search.against() if c.search.more(p.value)), None):
+            if not self.add(c, p.value, min(self.runs.jobs, c.search.most - p.n)):
+                return
 
 
 # ---- what was found
@@ -162,6 +175,7 @@ def row_of(c, value, least):
     some = c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
+           "stood_still": sum(t.stood for t in some), "late_speed": [t.late for t in some],
            "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value)}
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
@@ -171,19 +185,35 @@ def row_of(c, value, least):
     return out
 
 
+def contradiction(s):
+    """What speaks against the bracket of a search, "" where nothing does."""
+    if not (against := s.against()):
+        return ""
+    p = max(against, key=lambda p: s.judged(p.value) != bracket.OPEN)
+    words = "not monotonic" if s.judged(p.value) != bracket.OPEN else "perhaps not monotonic"
+    return f"{words}: at {p.value:.4g} {p.good} of {p.n} make it"
+
+
+def failures(s):
+    """Of a value that would be decided without the runs that failed, "" where there is none."""
+    return next((f"at {p.value:.4g} {p.failed} runs failed, which could overturn {p.good} of {p.n}"
+                 for p in s.points.values()
+                 if s.judged(p.value) == bracket.OPEN and s.verdict(p.good, p.bad, 0) != bracket.OPEN), "")
+
+
 def found_of(c, least):
     """The limit of a condition, and its curve."""
     s = c.search
     yes, no = s.ends()
-    why, sure = c.why, False
+    why, sure = c.why or contradiction(s), False
     if not why and yes is not None and no is not None and abs(no - yes) > s.resolution * (1 + 1e-6):
-        why = f"between them near {100 * s.share:g} % make it, and {s.most} fields do not decide"
+        why = failures(s) or f"between them near {100 * s.share:g} % make it, and {s.most} fields do not decide"
     elif not why and (yes is None or no is None):
         sure = all(s.judged(v) != bracket.OPEN for v in (s.start, s.end))
-        why = (f"{s.most} fields do not decide an end of the range" if not sure else
+        why = (failures(s) or f"{s.most} fields do not decide an end of the range" if not sure else
                "every value of the range makes it" if no is None else "no value of the range makes it")
-    return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no, "estimate": s.estimate(),
-            "resolved": sure or not why, "why": why,
+    return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no,
+            "estimate": np.nan if s.against() else s.estimate(), "resolved": sure or not why, "why": why,
             "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
             "points": [row_of(c, v, least) for v in sorted(c.trials) if c.trials[v]]}
 
@@ -228,6 +258,10 @@ def check(case, key):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
                        "tow.line.breaking_load")
+    if domain_width.read_ice_of(case):
+        raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
+                       "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
+                       "each value")
     if key == "ice.seed":
         raise RunError(key, "the fields are its values already", "search another key")
 
@@ -268,6 +302,10 @@ def arguments(argv):
             if a.search not in RANGES:
                 p.error(f"--search {a.search}: say its range with --from and --to")
             setattr(a, name, RANGES[a.search][k])
+    said = [text.partition("=")[0].strip() for text in (*a.set, a.conditions or "", a.search) if text]
+    for key in said:
+        if said.count(key) > 1:
+            p.error(f"{key} is given by more than one of --search, --for and --set: leave it in one")
     return a
 
 
@@ -301,12 +339,12 @@ def main(argv=None):
     if search.say:
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
-    unit = case.get(a.search, "").partition(" ")[2]
+    unit, across = case.get(a.search, "").partition(" ")[2], (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
     found = {
-        "case": a.case.name, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
-        "range": [start, end], "resolution": resolution, "for": (a.conditions or "").partition("=")[0],
-        "for_unit": case.get((a.conditions or "").partition("=")[0], "").partition(" ")[2],
+        "case": a.case.name, "values": {k: v for k, v in case.items() if k not in (a.search, across)}, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
+        "range": [start, end], "resolution": resolution, "for": across,
+        "for_unit": case.get(across, "").partition(" ")[2],
         "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]

@@ -36,16 +36,18 @@ def limits(found, markdown=False):
 
 
 def curve(found, markdown=False):
-    head = [found["for"] or "case", found["search"], "make it", "line parted", "speed, m/s (95 %)", "mean tow force",
+    head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted", "speed, m/s (95 %)", "mean tow force",
             "largest tension: mean", "of all"]
     rows = []
     for c in found["conditions"]:
         for p in c["points"]:
             low, high = p["mean_speed_95"]
-            band = "" if low is None else f" ({number(max(low, 0.0))} to {number(high)})"
+            least = min(0.0, *p["speed"])  # none is below where none was driven back
+            band = "" if low is None else f" ({number(max(low, least))} to {number(high)})"
             tension = [x for x in p["tension"] if x is not None]
             made = f"{p['made']} of {p['fields']}"
-            rows.append([condition(found, c), value(found, p["value"]), made, str(p["parted"]),
+            rows.append([condition(found, c), value(found, p["value"]), made, str(p.get("stood_still", "–")),
+                         str(p["failed"]), str(p["parted"]),
                          number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
                          force(max(tension, default=None))])
     return table(head, rows, markdown)
@@ -56,8 +58,10 @@ def meaning(found):
     runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
         p["failed"] for c in found["conditions"] for p in c["points"])
     line = ", and no branch of its line parts" if found["breaking_load"] else ""
-    more = f" {failed} runs failed and were replaced by other fields." if failed else ""
-    return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s in the mean over the window{line}. "
+    more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that failed "
+            "could have changed it.") if failed else ""
+    return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
+            f"over the window and over its last quarter{line}. Stood still: tows that the ice held for a while. "
             f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "
             f"fewer, each at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
             f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
@@ -135,7 +139,8 @@ def figure(found):
                 axes.axvspan(factor * c["makes_it"], factor * c["does_not"], color=colour, alpha=0.10, linewidth=0)
         axes.set_xlabel(words)
         axes.set_ylabel(label)
-        axes.set_ylim(bottom=0)
+        axes.set_ylim(bottom=min(0.0, *(x / unit for c in some for p in c["points"] for x in p[name] if x is not None),
+                                 0.0))
         axes.grid(True)
     grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
                        label=f"to be kept: {number(found['speed'])} m/s")

@@ -4,7 +4,7 @@ What converge.py and capability.py decide from.
 
     DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by
 
-A run is kept while the case file, the program and the values are what they were.
+A run is kept while the case file, the files that it names, the program and the values are what they were.
 """
 import argparse
 import hashlib
@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -23,6 +24,28 @@ from case_file import files
 import numpy as np
 
 STOPPED, SPENT = 6, "the budget is spent"  # exit code of a run that met its limit
+
+
+def texts_of(value):
+    """Texts in the contents of a YAML file."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, (dict, list)):
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from texts_of(part)
+
+
+def is_file(folder, text):
+    """Is this text of a case the name of a file: of a table, of outlines, of a field? Whatever the key, so that none is
+    forgotten; a title that is one by chance does no harm."""
+    try:
+        return (folder / text).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).digest()
 
 
 @dataclass
@@ -43,11 +66,14 @@ class CaseRuns:
     def __post_init__(self):
         version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
         try:
-            parts = [path for path, _ in files(self.case)]
+            layers = files(self.case)
         except RunError:
-            parts = [self.case]  # the program says what is wrong with it
-        #: a run is kept while the files of the case, the program and the values are what they were
-        self.identity = hashlib.sha256(b"".join(p.read_bytes() for p in parts) + version).hexdigest()
+            layers = [(self.case, {})]  # the program says what is wrong with it
+        read = [(path.parent, text) for path, some in layers for text in texts_of(some)]
+        read += [(self.case.parent, text.partition("=")[2].strip()) for text in self.given]
+        parts = [path for path, _ in layers] + [folder / text for folder, text in read if is_file(folder, text)]
+        #: of the files of the case and of the program
+        self.identity = hashlib.sha256(b"".join(map(digest, parts)) + version).hexdigest()
 
     def path(self, name, i):
         return self.folder / self.subject / name / f"f{i + 1:03d}"
@@ -58,11 +84,17 @@ class CaseRuns:
         out = [str(self.program), "run", str(self.case), "-o", str(self.path(name, i)), "--quiet", "--threads", "1"]
         return out + [part for text in sets for part in ("--set", text)]
 
+    def stamp(self, name, i, values):
+        """What a run is made by."""
+        named = [digest(self.case.parent / text).hex() for text in values.values()
+                 if isinstance(text, str) and is_file(self.case.parent, text)]
+        return [self.identity, *named, *self.arguments(name, i, values)]
+
     def kept(self, name, i, values):
         path = self.path(name, i)
         try:
             return (path / "summary.json").exists() and json.loads(
-                (path / "call.json").read_text()) == [self.identity, *self.arguments(name, i, values)]
+                (path / "call.json").read_text()) == self.stamp(name, i, values)
         except (OSError, ValueError):
             return False
 
@@ -84,7 +116,7 @@ class CaseRuns:
         if done.returncode:
             lines = done.stderr.strip().splitlines()
             return lines[0] if lines else f"exit code {done.returncode}"
-        (path / "call.json").write_text(json.dumps([self.identity, *call]))
+        (path / "call.json").write_text(json.dumps(self.stamp(name, i, values)))
         self.seconds[name] = time.monotonic() - t0
         self.made += 1
         return None
@@ -92,7 +124,19 @@ class CaseRuns:
     def make(self, name, fields, values):
         """Runs of these fields, as many at a time as there are jobs: None, or why it failed, of each."""
         with ThreadPoolExecutor(self.jobs) as pool:
-            return list(pool.map(lambda i: self.one(name, i, values), fields))
+            why = list(pool.map(lambda i: self.one(name, i, values), fields))
+        self.refuse_copies(name)
+        return why
+
+    def refuse_copies(self, name):
+        """Errors: RunError where two fields are the same run: what is decided by their scatter would be decided by
+        none. Without floes there is none, and that is true of every field."""
+        ends = [json.loads(path.read_text()) for path in
+                sorted((self.folder / self.subject / name).glob("f*/summary.json"))[:2]]
+        first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
+        if first is not None and first == second:
+            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read, and no "
+                           "seed changes it", "let the program make the ice, by removing ice.outlines or ice.field")
 
     def there(self, name, n, values):
         """Are n runs there now, or could they be made? False where the budget does not reach so far."""
@@ -108,12 +152,39 @@ class CaseRuns:
                            "mend the case" if name == "case" else "leave it out of --vary")
         return True
 
-    def measured(self, name, n, measure):
+    def measured(self, name, fields, measure):
+        """Of runs that are there."""
         out = []
-        for i in range(n):
+        for i in fields:
             with Run(self.path(name, i)) as run:
                 out.append(measure(run))
         return np.array(out, dtype=float)
+
+
+def ensemble_made(folder):
+    """When ensemble.h5 of a folder was made, None where it is not there."""
+    try:
+        return (folder / "ensemble.h5").stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+
+
+def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
+    """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
+    long as it takes). True when all have settled. Errors: RunError where the program refuses the study; a member that
+    fails is none, and the others are gathered as ever."""
+    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
+    call += [part for text in sets for part in ("--set", text)]
+    if np.isfinite(seconds):
+        call += ["--max-wall", f"{max(1.0, seconds):.0f}"]
+    before = ensemble_made(folder)
+    done = subprocess.run(call + ["--quiet"] * quiet, stderr=subprocess.PIPE, text=True,
+                          env=os.environ | {"OMP_NUM_THREADS": "1"})
+    if done.returncode not in (0, STOPPED) and ensemble_made(folder) == before:
+        said = (done.stderr.strip().splitlines() or [f"bergtow ensemble ended with exit code {done.returncode}"])[0]
+        raise RunError(study, said.removeprefix("bergtow: "), "mend the case or the study")
+    sys.stderr.write(done.stderr)
+    return done.returncode == 0
 
 
 def above_zero(text):

@@ -5,9 +5,12 @@ any other that was tried.
 A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
 So what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
 """
+import hashlib
+
 import numpy as np
 
 from bergtow_read import Run, RunError, case_value
+from ensemble_read import FINISHED
 
 #: {quantity of converge.py: the key that is its value}
 KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",
@@ -83,8 +86,27 @@ def _differ(a, b):
     return a.rpartition("/")[2] != b.rpartition("/")[2]
 
 
+def common(texts):
+    """{key: text} of what all these cases have alike."""
+    return {k: v for k, v in (texts[0] if texts else {}).items() if all(t.get(k) == v for t in texts)}
+
+
+def state(e):
+    """Of which study, and of how many members that had finished: {"study", "finished"}."""
+    return {"study": hashlib.sha256(e.study.encode()).hexdigest(), "finished": int(np.sum(e.status == FINISHED))}
+
+
+def stale(found, e):
+    """Why what was found by state(e) is not that of this ensemble any more, "" where it is, or does not say."""
+    now = state(e)
+    if found.get("study", now["study"]) != now["study"]:
+        return "of another study than its folder holds"
+    then = found.get("finished", now["finished"])
+    return "" if then == now["finished"] else f"of {then} members, while {now['finished']} have finished"
+
+
 def misfit(found, texts):
-    """Why converge.json is of another case than the members' (texts of cases()), "" where it is not, or does not say of
+    """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say of
     which it is: a key of the ice, the body, the tow, water or air that all members have alike, and it has not."""
     for key, value in (found.get("values") or {}).items():
         if not key.startswith(PHYSICAL) or key in PLACES:

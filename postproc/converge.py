@@ -64,10 +64,15 @@ def slower_start(run, k):
 
 
 def longer(run, k):
-    """Half the length more ahead of the body; the low end stays where it is."""
-    length, ahead = run.value("domain.length"), run.value("domain.ahead")
+    """Half the length more ahead of the body; the end behind it stays where it is. Errors: RunError for a tow that does
+    not go along the domain."""
+    length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.legs[1][:, 0]
+    if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
+        raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
+                       "take the width, or leave the length out of --vary")
     more = length * (1.5 ** k - 1)
-    out = {"domain.length": length + more, "domain.x0": run.value("domain.x0"), "body.x": run.value("body.x")}
+    out = {"domain.length": length + more, "domain.x0": run.value("domain.x0") - (more if along[0] < 0 else 0.0),
+           "body.x": run.value("body.x")}
     if run.case.get("domain.ends") == "moving" and np.isfinite(ahead):
         out["domain.ahead"] = ahead + more
     return out
@@ -142,8 +147,8 @@ def compare(study, kind, base_name, base_values, name, values, margin):
     for n in FIELDS:
         if not (study.there(base_name, n, base_values) and (kind.own or study.there(name, n, values))):
             return row | {"why": SPENT}
-        base = study.measured(base_name, n, kind.own or kind.measure)
-        other = study.measured(base_name if kind.own else name, n, kind.measure)
+        base = study.measured(base_name, range(n), kind.own or kind.measure)
+        other = study.measured(base_name if kind.own else name, range(n), kind.measure)
         if not (np.isfinite(base).all() and np.isfinite(other).all()):
             return row | {"why": f"a run has no {kind.what}"}
         if base.mean() == 0 or base.max() == base.sum():  # nothing to hold it against, without one field at least
@@ -210,8 +215,8 @@ def window(study, margin):
 
 def fields_row(study):
     """How many fields the mean needs, from those that are there."""
-    n = sum(study.kept("case", i, {}) for i in range(FIELDS[-1]))
-    x = study.measured("case", n, mean_resistance)
+    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i, {})]  # one in between may have met the budget
+    n, x = len(kept), study.measured("case", kept, mean_resistance)
     low, high = stat_mean.t_interval(x)
     needed = stat_mean.fields_needed(x.mean(), np.std(x, ddof=1), EFFORT)
     return [{"name": "fields", "key": "repeats", "fields": n, "quantity": "mean ice resistance", "mean": x.mean(),

@@ -30,8 +30,8 @@ import pdf
 import report
 from bergtow_read import Run, RunError
 from case_file import contents, files, is_study, says, section
-from case_runs import STOPPED, above_zero, program
-from domain_width import reads_ice
+from case_runs import above_zero, program, run_members
+from domain_width import read_ice_of, reads_ice
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
 from report_case import TITLE_BLOCK
@@ -64,28 +64,9 @@ class Work:
     def left(self):
         return self.end - time.monotonic()
 
-    def made(self):
-        """When ensemble.h5 was made, None where it is not there."""
-        try:
-            return (self.folder / "ensemble.h5").stat().st_mtime_ns
-        except FileNotFoundError:
-            return None
-
     def ensemble(self, study):
-        """Run the members that are not there yet, a process of one thread a core. True when all have settled. Errors:
-        RunError."""
-        call = [str(self.program), "ensemble", str(study), "-o", str(self.folder), "--threads", "1"]
-        call += ["--jobs", str(self.jobs)]
-        call += [part for text in self.given for part in ("--set", text)]
-        if np.isfinite(self.end):
-            call += ["--max-wall", f"{max(1.0, self.left()):.0f}"]
-        before = self.made()
-        done = subprocess.run(call + ["--quiet"] * self.quiet, stderr=subprocess.PIPE, text=True)
-        if done.returncode not in (0, STOPPED) and self.made() == before:  # refused; not a member that failed
-            raise RunError(study, (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0],
-                           "mend the case or the study")
-        sys.stderr.write(done.stderr)
-        return done.returncode == 0
+        """Run the members that are not there yet. True when all have settled. Errors: RunError."""
+        return run_members(self.program, study, self.folder, self.given, self.jobs, self.left(), self.quiet)
 
 
 def title_of(case, name, values):
@@ -159,6 +140,10 @@ def more_fields(left, rate, replay, n, most):
 
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
+    if reads_ice(case) and a.fields > 1:
+        print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
+              "fields")
+        a.fields = 1
     n = min(FIRST, a.fields)
     wider = widths(work, a, case)
     for c, width in wider.items():
@@ -209,7 +194,7 @@ def make_replay(work, a, left):
     if m is None:
         return
     with Run(e.folder(m)) as run:
-        if reads_ice({"ice": {k.split(".", 1)[1]: v for k, v in run.case.items() if k.startswith("ice.")}}):
+        if read_ice_of(run.case):
             return
         takes = run.number("wall_time_s")
         if takes > left:

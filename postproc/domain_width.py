@@ -22,6 +22,11 @@ def reads_ice(case):
     return any(str(says(case, "ice", k) or "none") != "none" for k in ("outlines", "field"))
 
 
+def read_ice_of(values):
+    """The same of a resolved case, {"section.key": text}."""
+    return any(values.get(f"ice.{k}", "none") != "none" for k in ("outlines", "field"))
+
+
 def stays(case, replaced):
     """Is the width of this case left as it is? replaced: keys that are given otherwise."""
     return (reads_ice(case) or any(says(case, *key.split(".")) is not None for key in PLACED)

@@ -150,6 +150,20 @@ def condition(e, c, members, options):
     return out | {"design": statement.statement(e, rows, out)}
 
 
+def sample(e, means):
+    """({parameter that is varied: [n]}, mean ice resistance [n], what the n are). means: by member.
+
+    Of a Latin hypercube the means of its conditions are the sample. The fields of a condition share what the parameters
+    leave unexplained of it; counted one by one they gave a parameter without effect an interval that excludes 0 in
+    58 % of 95 % intervals (10 conditions of 8 fields). In a grid all levels meet all others, and what one parameter
+    does cancels in the effect of another: there it was 0 to 6 %, so the members are the sample.
+    """
+    groups = [c.finished for c in e.conditions() if len(c.finished)] if e.sampled else [[m] for m in e.used]
+    first = np.array([g[0] for g in groups], dtype=int)
+    varied = {k: v[first] for k, v in e.parameters.items() if len(set(v[first].tolist())) > 1}
+    return varied, np.array([np.mean([means[m] for m in g]) for g in groups]), "conditions" if e.sampled else "members"
+
+
 def sensitivity(e, members):
     """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was
     varied.
@@ -157,15 +171,13 @@ def sensitivity(e, members):
     Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be
     predicted.
     """
-    rows = e.used
-    varied = {k: v[rows] for k, v in e.parameters.items() if len(set(v[rows].tolist())) > 1}
-    y = np.array([members[m]["mean"] for m in rows])
-    if not varied or len(rows) < 8:
-        return {"refused": "nothing is varied" if not varied else f"{len(rows)} members, needs 8"}
+    varied, y, of = sample(e, {m: members[m]["mean"] for m in e.used})
+    if not varied or len(y) < 8:
+        return {"refused": "nothing is varied" if not varied else f"{len(y)} {of}, needs 8"}
     logs = stat_sensitivity.sobol(
         varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
     return {
-        "members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y),
+        "members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
         "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs
     }
 
@@ -207,7 +219,7 @@ def statistics(e, options):
         "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
         "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
-        "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions,
+        "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS, "conditions": conditions,
         "sensitivity": sensitivity(e, members), "members": list(members.values()),
         "convergence": findings.read("converge", e.path)
     }

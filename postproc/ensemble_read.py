@@ -125,6 +125,7 @@ class Ensemble:
             for key, data in f["parameters"].items():
                 self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
                 self.units[key] = _text(data.attrs.get("units", "1"))
+            self.state = list(f["members/state_hash"].asstr()[()]) if "members/state_hash" in f else [""] * len(self.name)
             self.summary = {key: data[()] for key, data in f["summary"].items()}
             self.meaning = {
                 key: {k: v.decode() if isinstance(v, bytes) else v
@@ -321,13 +322,44 @@ class Ensemble:
                 self._dropped[int(m)] = hit
         return {self.name[m]: sorted(hit) for m, hit in self._dropped.items()}
 
+    @cached_property
+    def copies(self):
+        """{name: name of the other} of finished members that ended in the very state of an earlier one of their
+        condition: no fields of their own, whatever their seeds."""
+        first, out = {}, {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            other = first.setdefault((int(self.condition[m]), self.state[m] or self.name[m]), self.name[m])
+            if other != self.name[m]:
+                out[self.name[m]] = other
+        return out
+
     @property
     def used(self):
-        """Rows of members that finished with a mean and are not excluded."""
+        """Rows of members that finished with a mean, are not excluded, and are no copies."""
         mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
-        return np.array(
-            [m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean)) if int(m) not in self._dropped],
-            dtype=int)
+        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean))
+                         if int(m) not in self._dropped and self.name[m] not in self.copies], dtype=int)
+
+    @cached_property
+    def builds(self):
+        """A sentence on members of several builds, or of one that cannot be had again; "" where there is none."""
+        builds = {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            try:
+                with Run(self.folder(m)) as run:
+                    build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
+                    builds[build] = builds.get(build, 0) + 1
+            except RunError:
+                continue
+        said = []
+        if len(builds) > 1:
+            of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
+            said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
+                        f"({of}).")
+        if any(str(build[1]).endswith("-dirty") for build in builds):
+            said.append("The program was built from sources with changes that no revision holds: its results cannot be "
+                        "made again from the revision alone.")
+        return " ".join(said)
 
     def conditions(self):
         """Every Condition, in the order of the study."""
@@ -346,8 +378,10 @@ class Ensemble:
         return out
 
     def tows(self, rows):
-        """Rows of all finished members of the conditions of these, of those that are excluded, too."""
-        return np.flatnonzero(np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED))
+        """Rows of all finished members of the conditions of these, of those that are excluded, too, each
+        once."""
+        there = np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED)
+        return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies], dtype=int)
 
     def impacts(self, m):
         """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they

@@ -193,7 +193,8 @@ def sensitivity(s, markdown):
         "parameter", "Spearman", "PRCC",
         *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))
     ]
-    notes = [f"{x['members']} members. Brackets: 95 %."]
+    notes = [(f"{counted(x['members'])}. " if x["of"] == "members" else
+              f"Means of {x['samples']} conditions, of {counted(x['members'])}. ") + "Brackets: 95 %."]
     for of, k in kinds:
         notes.append(
             f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
@@ -256,6 +257,14 @@ def report(s, markdown=False):
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
+    if s["copies"]:
+        lines.append(
+            f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and count with "
+            f"it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): no seed changes ice "
+            f"that is read, or water without floes."
+        )
+    if s["builds"]:
+        lines.append(s["builds"])
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers" +

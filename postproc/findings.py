@@ -83,7 +83,8 @@ def read(name, folder):
 
 def chapter(name, found):
     """{"heading", "markdown", "figure"} of what a command found, for a report; figure is a function without arguments,
-    or None."""
+    or None. found["doubt"]: why it is not of what the report is of."""
     heading, words = KINDS[name]
     draw = getattr(words, "figure", None)
-    return {"heading": heading, "markdown": words.text(found, True), "figure": draw and (lambda: draw(found))}
+    warned = f"WARNING: {found['doubt'][0].upper()}{found['doubt'][1:]}.\n\n" if found.get("doubt") else ""
+    return {"heading": heading, "markdown": warned + words.text(found, True), "figure": draw and (lambda: draw(found))}

@@ -12,6 +12,7 @@ import sys
 from dataclasses import replace
 from itertools import groupby
 
+import compared
 import ensemble
 import ensemble_text
 import findings
@@ -239,27 +240,15 @@ def study_text(e):
 
 
 def provenance(e):
-    """(rows of the first member, sentence on members of other builds or None)."""
-    rows, builds = [], {}
+    """Rows of the first member that can be read."""
     for m in np.flatnonzero(e.status == FINISHED):
         try:
             with Run(e.folder(m)) as run:
-                build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
-                builds[build] = builds.get(build, 0) + 1
-                rows = rows or [(name, value)
-                                for name, value in report_run.provenance(run)
-                                if name not in ("state hash", "wall time", "folder", "started", "host")]
+                return [(name, value) for name, value in report_run.provenance(run)
+                        if name not in ("state hash", "wall time", "folder", "started", "host")]
         except RunError:
             continue
-    said = []
-    if len(builds) > 1:
-        of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
-        said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
-                    f"({of}).")
-    if any(str(build[1]).endswith("-dirty") for build in builds):
-        said.append("The program was built from sources with changes that no revision holds: its results cannot be "
-                    "made again from the revision alone.")
-    return rows, " ".join(said) or None
+    return []
 
 
 def caption(name):
@@ -320,11 +309,29 @@ NOT_STUDIED = {
 }
 
 
-def results_beside(folders):
-    """{name: what a command of findings.py left in the first of the folders that has it}."""
-    found = {name: next((f for f in (findings.read(name, folder) for folder in folders) if f is not None), None)
-             for name in findings.KINDS}
-    return {name: f for name, f in found.items() if f is not None}
+def doubt(name, found, folder, texts):
+    """Why what a command found is not of these members (texts: compared.cases of them), or no longer of the ensemble
+    in its folder; "" where it is. What does not say of what it is has no doubt: the files of earlier programs."""
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    try:
+        why = compared.stale(found, Ensemble(folder)) if name == "budget" else ""
+    except RunError:  # the folder holds what was found alone
+        return ""
+    return f"out of date, {why}: call bergtow budget again" if why else ""
+
+
+def results_beside(e, also):
+    """{name: what a command of findings.py left in the first of the folders that has it, with "doubt"}; folders: that
+    of the ensemble, and others."""
+    texts, out = compared.cases(e), {}
+    for name in findings.KINDS:
+        for folder in (e.path, *also):
+            found = findings.read(name, folder)
+            if found is not None:
+                out[name] = found | {"doubt": doubt(name, found, folder, texts)}
+                break
+    return out
 
 
 def beside(results):
@@ -387,11 +394,11 @@ def context(folder, place=None, given=None, also=()):
     if s["holes"]:
         print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
-    (rows, other_builds), rows_of = provenance(e), members(e, s)
+    rows, rows_of = provenance(e), members(e, s)
     values, texts, attributes = first_run(e)
     values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
               for v in varied(e, values)]
-    case, results = statement.case_of(e, e.used), results_beside([e.path, *also])
+    case, results = statement.case_of(e, e.used), results_beside(e, also)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(texts, attributes, given or {})
@@ -400,7 +407,7 @@ def context(folder, place=None, given=None, also=()):
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
         "answer": answer(e, s, case, results),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
-        "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
+        "warnings": [scrubbed(w) for w in warned],
         "method": report_method.method(s, case), "limits": report_method.limits(case, statement.unbounded(e, e.used)),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],

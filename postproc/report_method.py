@@ -133,13 +133,21 @@ def holds(case, s):
     return rows
 
 
+def _limit(found, c):
+    """Where the limit of a condition lies, with what keeps it from being resolved."""
+    ends = [capability_text.value(found, c[k]) for k in ("makes_it", "does_not") if c[k] is not None]
+    if c["resolved"] and len(ends) < 2:
+        return c["why"]
+    at = f"about {capability_text.value(found, c['estimate'])}" if c["estimate"] is not None else \
+        f"between {' and '.join(ends)}" if len(ends) == 2 else "not found"
+    return at if c["resolved"] else f"{at}; not resolved: {c['why']}"
+
+
 def _capability(found):
     """(what, value) of a capability.json, a row a condition."""
     key = found["search"].rpartition(".")[2].replace("_", " ")
     for c in found["conditions"]:
-        ends = [capability_text.value(found, c[k]) for k in ("makes_it", "does_not") if c[k] is not None]
-        at = f"about {capability_text.value(found, c['estimate'])}" if c["estimate"] is not None else \
-            f"between {' and '.join(ends)}" if len(ends) == 2 else c["why"] or "not found"
+        at = _limit(found, c) + (f" ({found['doubt']})" if found.get("doubt") else "")
         name = "" if not found["for"] else f", {capability_text.condition(found, c)}"
         yield (f"{key} at which half of the tows no longer keep {number(found['speed'])} m/s{name}"
                if found["share"] == 0.5 else
@@ -168,6 +176,8 @@ def beyond(results, e):
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
+    if budget is not None and budget.get("doubt"):
+        rows[0] = rows[0][0], f"{rows[0][1]} ({budget['doubt']})"
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
                  else _convergence(converge, e)))
     return rows + list(_capability(results["capability"]) if "capability" in results else [])

@@ -145,7 +145,7 @@ def sobol(parameters, y, resamples=RESAMPLES):
     if not names:
         return {"refused": "nothing is varied"}
     if n < LEAST_SAMPLES:
-        return {"refused": f"{n} members, needs {LEAST_SAMPLES}"}
+        return {"refused": f"{n} values, needs {LEAST_SAMPLES}"}
     if np.ptp(y) == 0:
         return {"refused": "the response does not vary"}
     columns, best = [scores(parameters[k]) for k in names], None
@@ -158,13 +158,13 @@ def sobol(parameters, y, resamples=RESAMPLES):
             best = found, a, terms, degree
     if best is None:
         return {
-            "refused": f"{n} members do not suffice for {len(names)} parameters: a linear expansion needs "
+            "refused": f"{n} values do not suffice for {len(names)} parameters: a linear expansion needs "
                        f"{PER_TERM * (len(names) + 1)} that differ in all of them"
         }
     (c, variance, r2, q2), a, terms, degree = best
     if q2 < LEAST_Q2:
         return {
-            "refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} members: "
+            "refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} values: "
                        f"Q² = {q2:.2f}, needs {LEAST_Q2}",
             "q2": q2, "r2": r2
         }

@@ -31,12 +31,13 @@ def described(name):
 
 def member(series, parameters, condition, **changes):
     """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N); more: further
-    series of result.h5, attributes: {name: attributes} of them; case: its text."""
+    series of result.h5, attributes: {name: attributes} of them; case: its text; state: hash
+    of its end, None for one of its own."""
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
         "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
         "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {},
-        "attributes": {}, "case": None
+        "attributes": {}, "case": None, "state": None
     } | changes
 
 
@@ -124,7 +125,7 @@ def write(folder, members, title="made up", sampling="grid"):
         f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])
-        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", ["0"] * n),
+        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", [m["state"] or f"{i}" for i, (m, *_) in enumerate(rows)]),
                            ("reason", [m["reason"] for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
         for group in ("parameters", "summary"):

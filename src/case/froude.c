@@ -26,7 +26,8 @@ static const struct {
     {"estimate.length_scale", -1}, // full scale / case
 };
 
-// Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well.
+// Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well;
+// at a scale of 1 it is that of the twin.
 static const char *const plain_texts[] = {"run.title",     "reference.source", "report.client",
                                          "report.project", "report.author",    "report.revision"};
 
@@ -99,7 +100,7 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
         case BT_KEY_TEXT: {
             const char *text;
             memcpy(&text, member, sizeof text);
-            if (text && !is_plain(k->name))
+            if (text && ratio != 1 && !is_plain(k->name))
                 bt_errors_add(
                     err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
                     c->path ? c->path : "case", k->name, text);

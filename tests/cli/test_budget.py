@@ -185,6 +185,55 @@ def test_converge_of_another_case_does_not_fit():
     assert why(ice__field="other.h5") == "ice.field is other.h5 there and /a/field.h5 here"
 
 
+# ---- studies with gaps
+
+
+def with_status(folder, status, n=20):
+    """A hypercube of n conditions and two fields, whose member of condition c and repeat r has status(c, r)."""
+    rng = np.random.default_rng(8)
+    members = [made_up.member(np.full(3, 100.0 + 5 * c + rng.normal()), {"ice.friction": (c + 0.5) / n}, c,
+                              status=status(c, r), reason="it diverged" if status(c, r) == made_up.FAILED else "")
+               for c in range(n) for r in range(2)]
+    return made_up.write(folder, members, sampling="latin-hypercube")
+
+
+def test_a_study_that_is_cut_short_is_taken_as_far_as_it_is_a_fair_sample(tmp_path):
+    """Of each repeat the conditions before the first gap: those beyond are done because they take less time."""
+    e = Ensemble(with_status(tmp_path / "a", lambda c, r: r == 0 or c < 10 or c == 15))
+    found = budget.of_ensemble(e)
+    assert (found["members"], found["conditions"], found["waiting"], found["left_out"]) == (30, 20, 9, 1)
+    assert np.isfinite(found["mean_95"]).all()
+    said = budget_text.text(plain(found | {"numerics": None}))
+    assert said.startswith("WARNING: 9 of 40 members are still to come") and "beyond the first gap 1 are done" in said
+    with pytest.raises(RunError, match="too few members for a budget: 0 conditions, needs 8"):
+        budget.of_ensemble(Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
+
+
+def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
+    """What made them fail may be what is asked for. They are named, and no script takes the rest for the whole."""
+    failing = {(18, 0), (19, 1)}
+    folder = with_status(tmp_path / "a", lambda c, r: made_up.FAILED if (c, r) in failing else made_up.FINISHED)
+    monkeypatch.setattr(budget, "run_members", lambda *a: False)
+    (tmp_path / "study.yml").write_text("")
+    with pytest.raises(RunError, match=r"2 of 40 members failed \(c019-r001, c020-r002\)"):
+        budget.main([str(tmp_path / "study.yml"), "-o", str(folder)])
+    found, said = json.loads((folder / "budget.json").read_text()), capsys.readouterr().out
+    assert found["mean_95"] == found["fields"]["sd_95"] == [None, None] and found["mean"] > 0
+    assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
+
+
+def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
+    whole = Ensemble(with_status(tmp_path / "a", lambda c, r: 1))
+    cut = Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 or c < 10))
+    found = plain(budget.of_all(cut, ["mean_ice_resistance_n"], None))
+    assert compared.stale(found, cut) == "" == compared.stale({}, cut)
+    assert compared.stale(found, whole) == "of 30 members, while 40 have finished"
+    whole.study += "another"
+    assert compared.stale(found, whole) == "of another study than its folder holds"
+    assert found["values"] == {"ice.concentration": "0.5"}
+    assert compared.common([{"a": "1", "b": "2"}, {"a": "1", "b": "3"}]) == {"a": "1"}
+
+
 # ---- the sampler
 
 
@@ -302,6 +351,9 @@ def test_what_is_refused(small, tmp_path):
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
     for wrong in ("tow_force:101", "tow_force:0"):
         assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out")
+    # the folder holds another study: its numbers are no answer to this one
+    for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
+        assert "another study" in said(study, *more, out=folder / "out")
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness import BERGTOW, ROOT, TOW, changed, environment, write_case
+from harness import BERGTOW, ROOT, TOW, changed, environment, run, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -89,7 +89,91 @@ def test_ranges_without_a_limit_and_ends_that_are_open():
     assert 0.6 <= yes < 0.8 and no is None and open_end.point(1.0).n == 12
 
 
+def tried(counts, **more):
+    """A search with these counts: {value: (good, trials)}."""
+    b = bracket.Bracket(0.2, 0.95, 0.05, most=12, **more)
+    for value, (good, n) in counts.items():
+        p = b.point(value)
+        p.good, p.bad = good, n - good
+    return b
+
+
+@pytest.mark.parametrize("counts, limit", [({0.2: (6, 6), 0.95: (0, 3)}, 0.575), ({0.2: (4, 6), 0.95: (1, 6)}, 0.45),
+                                           ({0.2: (1, 6), 0.95: (4, 6)}, 0.7), ({0.2: (0, 3), 0.95: (6, 6)}, 0.575)])
+def test_the_direction_is_that_of_the_trials(counts, limit):
+    """Also where an end is undecided, so that there is nothing on one of the sides."""
+    assert tried(counts).estimate() == pytest.approx(limit)
+
+
+def test_what_contradicts_the_bracket_is_reported():
+    def found(counts):
+        return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)), 0.1)
+    hole = {0.2: (6, 6), 0.3875: (2, 4), 0.575: (0, 4), 0.7625: (0, 4), 0.95: (6, 6)}
+    one = found(hole)
+    assert not one["resolved"] and one["why"] == "perhaps not monotonic: at 0.575 0 of 4 make it"
+    assert np.isnan(one["estimate"])
+    assert found(hole | {0.575: (0, 6)})["why"] == "not monotonic: at 0.95 6 of 6 make it"
+    assert found({0.2: (6, 6), 0.575: (3, 4), 0.95: (6, 6)})["why"] == "every value of the range makes it"
+    fine = found({0.2: (6, 6), 0.5: (6, 6), 0.54: (0, 6), 0.75: (0, 4), 0.95: (0, 6)})
+    assert fine["resolved"] and fine["why"] == ""
+
+
+def test_what_contradicts_the_bracket_is_run_until_it_is_decided(monkeypatch):
+    c = capability.Condition("case", "the case", np.nan, {}, tried({0.2: (6, 6), 0.95: (6, 6)}))
+    search = capability.Search(type("Runs", (), {"jobs": 2}), "ice.concentration", 0.1, None)
+    def add(c, value, n):
+        c.search.point(value).bad += n
+        return True
+    monkeypatch.setattr(search, "add", add)
+    search.fill(c, 3, 4)
+    assert c.search.point(0.575).bad == 6 and capability.contradiction(c.search).startswith("not monotonic")
+
+
 # ---- trials and runs
+
+
+class Told(Run):
+    """A run by its series."""
+
+    case = path = events = summary = None
+
+    def __init__(self, x, y=None, case=None):
+        self._cache, self.case, self.path, self.events = {}, case or {}, "told", []
+        self.series = {"time": np.arange(float(len(x))), "body_x": np.asarray(x, dtype=float),
+                       "body_y": np.zeros(len(x)) if y is None else np.asarray(y, dtype=float)}
+        self.summary = {"window": {"start_s": 0.0, "end_s": len(x) - 1.0}, "stalled_windows": 0}
+
+    def __getitem__(self, name):
+        return self.series[name]
+
+    def __contains__(self, name):
+        return name in self.series
+
+
+def test_a_tow_that_has_come_to_rest_does_not_make_it():
+    """However long it went before: the mean over the window alone tells when the window ends."""
+    rests = Told(np.minimum(np.arange(101.0), 70))
+    rests.summary["stalled_windows"] = 3
+    one = capability.trial(rests, 1)
+    assert one.speed == pytest.approx(0.7) and one.late == 0 and one.stood and not one.made(0.1)
+    paused = capability.trial(Told(np.concatenate([np.arange(50), np.full(20, 50), np.arange(50, 81)])), 1)
+    assert paused.made(0.1) and paused.late == pytest.approx(1)
+
+
+def test_a_body_that_is_driven_back_makes_no_way(tmp_path):
+    t = np.arange(11.0)
+    assert Told(300 - 0.6 * t).speed_made_good == pytest.approx(-0.6)
+    assert Told(300 - 0.6 * t, case={"tow.direction": "3.14159265358979 rad"}).speed_made_good == pytest.approx(0.6)
+    assert Told(0.3 * t, y=np.sin(t)).speed_made_good == pytest.approx(0.3)  # sway
+    # round two corners, across its own path, and back along it
+    case = {"tow.waypoints": "[[4 m, 0 m], [4 m, 4 m], [2 m, 4 m], [2 m, -9 m]]", "body.x": "0 m", "body.y": "0 m"}
+    x, y = [0, 2, 4, 4, 4, 2, 2, 2, 2], [0, 0, 0, 2, 4, 4, 2, 0, -2]
+    assert Told(x, y, case).speed_made_good == pytest.approx(2)
+    assert Told(x + x[::-1][1:2], y + y[::-1][1:2], case).speed_made_good == pytest.approx(14 / 9)
+    drifts = changed(THRUST, water__current_x=-0.2, tow__vessel__bollard_pull=1, ice__concentration=0.05, body__x=8,
+                     domain__ends="open")
+    with Run(run(tmp_path, drifts).dir) as r:
+        assert capability.trial(r, 1).speed < -0.05 and not capability.trial(r, 1).made(0.01)
 
 
 def found_in(folder, case, *more, code=0):
@@ -199,21 +283,36 @@ def test_what_is_refused(tmp_path):
     assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=4)
     assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=4)
     assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=4)
+    for more in (("--for", "ice.concentration=0.5,0.6"), ("--set", "ice.concentration = 0.5"),
+                 ("--for", "ice.thickness=1,2", "--set", "ice.thickness=1")):
+        assert "is given by more than one of --search, --for and --set" in found_in(tmp_path, THRUST, *more, code=2)
+    square = {"type": "Polygon", "coordinates": [[[8, 0], [9, 0], [9, 1], [8, 1], [8, 0]]]}
+    (tmp_path / "floes.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": {}, "geometry": square}]}))
+    case = changed(THRUST, ice__outlines="floes.geojson", ice__outlines_crs="frame", ice__concentration=None,
+                   ice__size=None)
+    assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=4)
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
 
 
 def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, monkeypatch):
-    """Every third field fails: others stand for it; and a search without time says so."""
+    """Of twelve fields one fails: that one could not change what eleven say. With three of nine that fail it could, and
+    a search without time says so."""
     case = write_case(tmp_path, THRUST)
     runs = case_runs.CaseRuns(case, tmp_path, "capability", Path(BERGTOW), [], 1, np.inf, np.inf)
-    monkeypatch.setattr(runs, "make", lambda name, fields, sets: ["diverged" if i % 3 == 2 else None for i in fields])
     monkeypatch.setattr(capability, "Run", made_up_run)
-    c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=6))
     search = capability.Search(runs, "ice.concentration", 0.1, None)
-    search.find(c)
-    found = capability.found_of(c, 0.1)
-    assert found["resolved"] and found["points"][0]["failed"] == 2 and found["points"][0]["fields"] == 6
-    assert [t.field for t in c.trials[0.2]] == [1, 2, 4, 5, 7, 8]
+    def found_with(failing):
+        monkeypatch.setattr(runs, "make", lambda name, fields, sets: [failing(i) for i in fields])
+        c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=12))
+        search.find(c)
+        return c, capability.found_of(c, 0.1)
+    c, found = found_with(lambda i: "diverged" if i == 2 else None)
+    assert found["resolved"] and found["points"][0]["failed"] == 1 and found["points"][0]["fields"] == 11
+    assert [t.field for t in c.trials[0.2]] == [1, 2, *range(4, 13)]
+    _, found = found_with(lambda i: "diverged" if i % 3 == 2 else None)
+    assert not found["resolved"] and found["makes_it"] is None
+    assert found["why"] == "at 0.2 3 runs failed, which could overturn 6 of 6"
     monkeypatch.setattr(runs, "end", 0.0)
     late = capability.Condition("late", "late", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2))
     search.find(late)
@@ -223,11 +322,10 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
 class made_up_run:
     """A run whose body keeps 0.15 m/s below a concentration of 0.5, and stops above."""
 
-    window, case, summary, events = (0.0, 10.0), {}, {}, []
-    speed_made_good = Run.speed_made_good
+    window, summary, events = (0.0, 10.0), {}, []
 
     def __init__(self, path):
-        self.path, self.speed = path, 0.15 if float(path.parent.name) < 0.5 else 0.0
+        self.path, self.speed_made_good = path, 0.15 if float(path.parent.name) < 0.5 else 0.0
 
     def __enter__(self):
         return self
@@ -235,12 +333,8 @@ class made_up_run:
     def __exit__(self, *exc):
         return False
 
-    def __contains__(self, name):
-        return True
-
-    def __getitem__(self, name):
-        t = np.arange(11.0)
-        return t if name == "time" else self.speed * t if name == "body_x" else 0 * t
+    def made_good(self, start, end):
+        return self.speed_made_good
 
     def number(self, key):
         return 1.0
@@ -262,6 +356,7 @@ def test_its_block_for_a_report(tmp_path):
     (tmp_path / "capability.json").write_text(json.dumps(found))
     block = findings.chapter("capability", findings.read("capability", tmp_path))
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
+    assert "| stood still | failed |" in block["markdown"] and "| 2 of 2 | – | 1 |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}

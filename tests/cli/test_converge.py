@@ -16,8 +16,10 @@ from test_postproc import script
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
+import case_runs  # noqa: E402
 import converge  # noqa: E402
 import converge_text  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
 
 
 @pytest.mark.parametrize("n", [4, 8, 32])
@@ -171,3 +173,72 @@ def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monk
     assert [round(left) for _, left in asked] == [30, 45, 90, 90]
     never, asked[:] = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 30), []
     assert never["dt"][0]["why"] == converge.SPENT
+
+
+def runs_of(folder, case, given=()):
+    path = write_case(folder, case)
+    return case_runs.CaseRuns(path, folder / "out", "converge", Path(BERGTOW), list(given), 1, np.inf, np.inf)
+
+
+def settled(runs, i, values=None, name="case", **summary):
+    """A run as the program leaves it, without its results."""
+    runs.path(name, i).mkdir(parents=True, exist_ok=True)
+    (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
+    (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(name, i, values or {})))
+
+
+@pytest.mark.parametrize("where", ["case", "base", "set", "value"])
+def test_a_file_that_the_case_names_is_a_part_of_it(tmp_path, where):
+    """A run of another table is another run, whoever names the table."""
+    (tmp_path / "current.csv").write_text("t,u,v\n0,0,0\n")
+    named = changed(CASE, water__current_table="current.csv")
+    case = named if where == "case" else {"base": "base.yml"} if where == "base" else CASE
+    write_case(tmp_path, named, "base.yml")
+    given = ["water.current_table=current.csv"] if where == "set" else []
+    values = {"water.current_table": "current.csv"} if where == "value" else {}
+    runs = runs_of(tmp_path, case, given)
+    settled(runs, 0, values)
+    assert runs_of(tmp_path, case, given).kept("case", 0, values)
+    (tmp_path / "current.csv").write_text("t,u,v\n0,1,0\n")
+    assert not runs_of(tmp_path, case, given).kept("case", 0, values)
+
+
+def test_fields_are_those_that_are_there(tmp_path, monkeypatch):
+    """A run in between may have met the budget: its folder is no field."""
+    runs = runs_of(tmp_path, CASE)
+    for i in (0, 1, 3, 4):
+        settled(runs, i)
+    asked = []
+    monkeypatch.setattr(runs, "measured", lambda name, fields, measure: asked.extend(fields) or np.arange(4.0))
+    assert converge.fields_row(runs)[0]["fields"] == 4 and asked == [0, 1, 3, 4]
+
+
+def test_fields_that_are_the_same_run_are_refused(tmp_path):
+    runs = runs_of(tmp_path, CASE)
+    for i in (0, 1):
+        settled(runs, i, n_floes=0, state_hash="a")
+    assert runs.make("case", [0, 1], {}) == [None, None]  # without floes there is no scatter
+    settled(runs, 0, state_hash="b")
+    assert runs.make("case", [0, 1], {}) == [None, None]
+    settled(runs, 1, state_hash="b")
+    with pytest.raises(RunError, match="the ice is read, and no seed changes it"):
+        runs.make("case", [0, 1], {})
+
+
+class Towed:
+    """The case of a tow of this heading from 240 m in a domain of 300 m."""
+
+    path, case = "towed", {"domain.ends": "walls"}
+    value = {"domain.length": 300.0, "domain.ahead": np.nan, "domain.x0": 0.0, "body.x": 240.0}.get
+
+    def __init__(self, *headings):
+        self.legs = np.zeros((len(headings), 2)), np.array([[np.cos(h), np.sin(h)] for h in np.radians(headings)])
+
+
+def test_the_length_grows_ahead_of_the_body():
+    ahead = {"domain.length": 450.0, "domain.x0": 0.0, "body.x": 240.0}
+    assert converge.longer(Towed(0, 20), 1) == ahead
+    assert converge.longer(Towed(180), 1) == ahead | {"domain.x0": -150.0}
+    for headings in ((90,), (0, 90), (0, 180)):
+        with pytest.raises(RunError, match="does not go along the domain"):
+            converge.longer(Towed(*headings), 1)

@@ -201,13 +201,14 @@ def test_members_of_other_builds_and_lost_folders_are_reported(study):
         f.attrs["revision"] = "other"
     made_up.record(study / "members/c001-r001", Ensemble(study).study)
     e = Ensemble(study)
-    assert "2 builds" in report_ensemble.provenance(e)[1]
+    assert "2 builds" in e.builds
+    assert "2 builds" in " ".join(report_ensemble.context(study)["warnings"])
     (study / "members/c001-r002").rename(study / "members/lost")
     assert "cannot be read" in report_ensemble.reported(e, 1)[0]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
-    assert report_ensemble.provenance(Ensemble(study))[1] is None
+    assert not Ensemble(study).builds
 
 
 def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeypatch):
@@ -271,6 +272,41 @@ def test_a_quantity_has_one_verdict(tmp_path):
     assert said("b", dt="1 s") == "open is length; no effect that matters of dt, width, window"
     assert said("c", dt="0.5 s", width="40 m") == \
         "open is length; no effect that matters of window; not compared at the value of these tows: dt, width"
+
+
+def test_results_of_another_case_or_of_before_are_doubted(tmp_path):
+    case = "ice:\n  size: {} m\n"
+    folder = made_up.write(tmp_path / "e", [member(np.ones(50), {}, 0, case=case.format(30)) for _ in range(2)])
+    e = Ensemble(folder)
+    def said(name, place=folder, **found):
+        place.mkdir(exist_ok=True)
+        (place / f"{name}.json").write_text(json.dumps(found))
+        return report_ensemble.results_beside(e, [place])[name]["doubt"]
+    for name in ("budget", "capability", "converge"):
+        assert said(name, values={"ice.size": "30 m"}) == said(name) == ""
+        assert said(name, values={"ice.size": "20 m"}) == "studied for another case: ice.size is 20 m there and 30 m here"
+    now = report_ensemble.compared.state(e)
+    assert said("budget", **now) == ""
+    assert said("budget", **now | {"finished": 1}) == \
+        "out of date, of 1 members, while 2 have finished: call bergtow budget again"
+    (folder / "budget.json").unlink()
+    assert said("budget", tmp_path / "alone", **now | {"finished": 1}) == ""  # no ensemble lies there
+
+
+def test_a_limit_that_is_not_resolved_is_not_stated_as_one():
+    base = {"makes_it": None, "does_not": None, "estimate": None, "resolved": False, "why": "", "label": "the case"}
+    def said(doubt="", **found):
+        c = base | found
+        return [at for _, at in report_method._capability(
+            {"search": "ice.concentration", "unit": "", "for": "", "speed": 0.3, "share": 0.5, "conditions": [c],
+             "doubt": doubt})]
+    assert said(makes_it=0.5, does_not=0.6, estimate=0.55, resolved=True) == ["about 55.0 %"]
+    assert said(makes_it=0.95, estimate=0.78, resolved=True, why="every value of the range makes it") == \
+        ["every value of the range makes it"]
+    assert said(makes_it=0.39, estimate=0.227, why="12 fields do not decide an end of the range") == \
+        ["about 22.7 %; not resolved: 12 fields do not decide an end of the range"]
+    assert said(makes_it=0.2, does_not=0.9, why="not monotonic: at 0.5 0 of 6 make it", doubt="of another case") == \
+        ["between 20.0 % and 90.0 %; not resolved: not monotonic: at 0.5 0 of 6 make it (of another case)"]
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ import csv
 import json
 import os
 import shutil
+from types import SimpleNamespace
 
 import h5py
 import matplotlib
@@ -191,6 +192,57 @@ def test_which_parameter_matters(plain):
     a, v = np.var(np.log([0.2, 0.5])), 4 * np.var(np.log([0.1, 0.2, 0.4]))
     assert logs["indices"]["tow.speed"]["first"] == pytest.approx(
         v / (a + v), abs=0.05) and logs["indices"]["ice.concentration"]["total"] == pytest.approx(a / (a + v), abs=0.05)
+
+
+class Hypercube:
+    """Conditions whose means no parameter explains, with fields that scatter little."""
+
+    sampled = True
+
+    def __init__(self, n, fields, rng):
+        self.used = np.arange(n * fields)
+        self.parameters = {k: np.repeat(rng.random(n), fields) for k in ("ice.friction", "ice.thickness")}
+        self.means = np.repeat(rng.normal(100, 10, n), fields) + rng.normal(0, 1, n * fields)
+        self.rows = np.split(self.used, n)
+
+    def conditions(self):
+        return [SimpleNamespace(finished=rows) for rows in self.rows]
+
+
+@pytest.mark.parametrize("n, fields", [(10, 8), (32, 2)])
+def test_fields_of_a_condition_are_no_sample_of_its_parameters(n, fields):
+    """Of parameters without effect at most 5 % of the intervals exclude 0, and no expansion predicts the conditions."""
+    rng, found, tries = np.random.default_rng(7), 0, 150
+    for k in range(tries):
+        e = Hypercube(n, fields, rng)
+        s = ensemble.sensitivity(e, {m: {"mean": e.means[m]} for m in e.used}) if k < 5 else {
+            "ranks": ensemble.stat_sensitivity.rank_correlations(*ensemble.sample(e, e.means)[:2])}
+        low, high = s["ranks"]["ice.friction"]["prcc_95"]
+        found += low > 0 or high < 0
+        assert k >= 5 or s["samples"] == n and "refused" in s["sobol"]
+    assert found / tries <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / tries)
+
+
+def test_a_run_that_is_there_twice_counts_once(tmp_path):
+    """Ice that is read is the same for each seed."""
+    some = [made_up.member(np.full(50, 100.0 + 10 * (r % 2) + c), {"ice.friction": 0.1 * (c + 1)}, c,
+                           state="ab"[r % 2] if c == 0 else None) for c in range(2) for r in range(4)]
+    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1)
+    assert result.returncode == 0, result.stderr
+    s = json.loads((tmp_path / "all/statistics.json").read_text())
+    assert [c["resistance"]["n"] for c in s["conditions"]] == [2, 4]
+    assert s["copies"] == {"c001-r003": "c001-r001", "c001-r004": "c001-r002"}
+    assert "2 members ended in the very state of another one" in result.stdout and "6 of 8 members" in result.stdout
+
+
+def test_members_of_two_builds_are_reported(tmp_path):
+    folder = made_up.write(tmp_path / "all", [made_up.member(np.ones(50) + k, {}, 0) for k in range(3)])
+    with h5py.File(folder / "members/c001-r001/result.h5", "a") as f:
+        f.attrs["revision"] = "other"
+    made_up.record(folder / "members/c001-r001", Ensemble(folder).study)
+    result = script("ensemble.py", folder, "--resamples", 1)
+    assert "The members come from 2 builds of the program" in result.stdout
+    assert "2 builds" in json.loads((folder / "statistics.json").read_text())["builds"]
 
 
 def test_what_is_refused(tmp_path, plain, capsys):
