@@ -9,6 +9,7 @@
 #include "bergtow/world.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_idle.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
 #include "base/elementary.h"
@@ -125,4 +126,5 @@ void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
     bt_packing_warn(&packing, c->run.duration, warnings);
     warn_of_step(c, n, warnings);
     bt_case_warn_start(c, warnings);
+    bt_case_warn_idle(c, warnings);
 }

@@ -9,6 +9,7 @@
 #include "output/summary.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_idle.h"
 #include "estimate/packing.h"
 #include "output/summary_window.h"
 #include "base/elementary.h"
@@ -255,6 +256,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->ns_per_floe_step =
         n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 
+    bt_case_warn_idle(c, &s->warnings);
     warn_of_solver(s, h, c, t);
     warn_of_bodies(s, h, c, t);
 }

@@ -256,7 +256,7 @@ def test_field_files_with_bays(tmp_path):
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
     split = changed(BASE, ice__nonconvex="split")
     field(tmp_path, split)
-    stored = changed(BASE, ice={"field": "out.h5", "thickness": 0.25})
+    stored = changed(BASE, ice={"field": "out.h5"})
     r = call("check", write_case(tmp_path, stored))
     assert r.returncode == CASE and "floe 0" in r.stderr and "not convex" in r.stderr and "ice.nonconvex" in r.stderr
     a = run(tmp_path, split, name="a")
