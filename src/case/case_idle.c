@@ -23,7 +23,7 @@ typedef struct idle {
     const char *why;   ///< completes "has no effect "
 } idle;
 
-enum { RULES = 9 };
+enum { RULES = 10 };
 
 static void list(const bt_case *c, idle out[RULES])
 {
@@ -40,6 +40,8 @@ static void list(const bt_case *c, idle out[RULES])
          "on the floes of a field file, which have thicknesses of their own"},
         {c->ice.field && c->n_floes == 0, "ice.thickness", "ice.field",
          "on the floes of a field file, which have thicknesses of their own"},
+        {c->ice.field, "ice.x_min ice.x_max ice.y_min ice.y_max", "ice.field",
+         "on a field file, which has its own ice region"},
         {!c->ice.field && c->ice.thickness_law == BT_THICK_CONSTANT, "ice.thickness_spread", "ice.thickness_law",
          "with ice.thickness_law: constant"},
         {!read && c->ice.size_law == BT_SIZE_SINGLE, "ice.size_min ice.size_max", "ice.size_law",
@@ -55,7 +57,6 @@ static void list(const bt_case *c, idle out[RULES])
     memcpy(out, all, sizeof all);
 }
 
-/// Has a key another value than its default?
 static bool is_changed(const bt_case *c, const bt_case *defaults, const char *name)
 {
     const bt_key *k = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
@@ -65,6 +66,15 @@ static bool is_changed(const bt_case *c, const bt_case *defaults, const char *na
     return memcmp((const char *)c + k->offset, (const char *)defaults + k->offset, size) != 0;
 }
 
+bool bt_case_changed(const bt_case *c, const char *key)
+{
+    bt_case defaults;
+    bt_case_defaults(&defaults);
+    const bool changed = is_changed(c, &defaults, key);
+    bt_case_free(&defaults);
+    return changed;
+}
+
 /// Calls found for each key that is not used although its value is not the default.
 static void look(const bt_case *c, void (*found)(void *to, const char *key, const idle *r), void *to)
 {
@@ -72,6 +82,8 @@ static void look(const bt_case *c, void (*found)(void *to, const char *key, cons
     bt_case defaults;
     list(c, rules);
     bt_case_defaults(&defaults);
+    defaults.ice.x_min = c->domain.x0, defaults.ice.x_max = c->domain.x0 + c->domain.length;
+    defaults.ice.y_min = c->domain.y0, defaults.ice.y_max = c->domain.y0 + c->domain.width;
     for (int i = 0; i < RULES; i++)
         for (const char *keys = rules[i].keys; rules[i].so && *keys; keys += strspn(keys, " ")) {
             char name[LONGEST_NAME];

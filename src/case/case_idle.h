@@ -11,4 +11,7 @@ void bt_case_check_idle(const bt_check *k);
 /// Warn of the others, which a base or a study may have brought along.
 void bt_case_warn_idle(const bt_case *c, bt_errors *warnings);
 
+/// Has a key of a number or a choice another value than its default?
+bool bt_case_changed(const bt_case *c, const char *key);
+
 #endif
