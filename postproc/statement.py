@@ -17,6 +17,7 @@ import stat_load
 import stat_mean
 import stat_profile
 from bergtow_read import Run, RunError
+from report_case import source_of_ice
 from text_table import hours_text, quantity, short
 
 LOCKS = 60          # body widths that ice asks for which locks as the body displaces it (src/case/arch.c)
@@ -69,6 +70,14 @@ def _breaking_loads(run, mode):
     return {name: load for name, load in found.items() if load > 0 and mode != "speed"}
 
 
+def ice_as_read(run):
+    """{key: value} of a run whose ice is read from a file: the keys say nothing of it."""
+    if source_of_ice(run.case) is None or not run.n_floes:
+        return {}
+    size = np.sqrt(4 * run.area / np.pi).mean()
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness.mean():.3g} m"}
+
+
 def case_of(e, rows):
     """Case of the first member of a condition that can be read, None where none can."""
     for m in rows:
@@ -77,7 +86,8 @@ def case_of(e, rows):
                 limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
                 mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
                 return Case(not any(x > 0 for x in limits), mode, _breaking_loads(run, mode),
-                            pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0), run.case)
+                            pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
+                            run.case | ice_as_read(run))
         except RunError:
             continue
     return None

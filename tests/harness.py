@@ -74,6 +74,15 @@ def changed(base, /, **changes):
     return case
 
 
+MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
+        "size_exponent", "thickness", "thickness_law", "thickness_spread", "shake")
+
+
+def reading(base, field):
+    """A copy of a case that reads its ice from a field file, without the keys that this leaves without effect."""
+    return changed(base, ice__field=str(field), **{f"ice__{key}": None for key in MADE})
+
+
 def write_case(folder, case, name="case.yml"):
     """JSON is YAML, and its numbers read back to the same bits."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -286,6 +286,8 @@ class Scene:
         if law == "power":
             v["ice.size_min"], v["ice.size_max"], v["ice.size_exponent"] = size * d.flat(0.4, 0.8), size * d.flat(
                 1, 1.8), d.flat(0.5, 4)
+            if self.ends != "moving":
+                del v["ice.size"] # without effect, and refused
         elif d.chance(0.7):
             v["ice.size_spread"] = d.flat(0, 0.4)
         self.choose("ice.thickness_law")
@@ -499,6 +501,8 @@ def draw(seed, table):
         if d.chance(0.35):
             values[name] = free_value(d, keys[name], spec)
     values["ice.start"] = d.one(keys["ice.start"]["choices"]) # last: the draws of before stay
+    if values["ice.thickness_law"] == "constant":
+        values.pop("ice.thickness_spread", None) # without effect, and refused
     case = {}
     for name, value in values.items():
         *sections, key = name.split(".")

@@ -142,8 +142,9 @@ SCENES = {
     "lead_managed": changed(SHORT, lead={"mode": "managed", "width": 3, "floe_size": 0.4}, run__dt=0.05,
                             tow__speed=0.4),
     "rectangles": changed(SHORT, ice__shape="rectangles", ice__aspect=1.6, ice__concentration=0.7),
-    "pentagons_power_law": changed(SHORT, ice__shape="polygons", ice__sides=5, ice__size_law="power", ice__size_min=0.4,
-                                   ice__size_max=1.6, ice__concentration=0.4, ice__size_exponent=1.6),
+    "pentagons_power_law": changed(SHORT, ice__shape="polygons", ice__sides=5, ice__size=None, ice__size_law="power",
+                                   ice__size_min=0.4, ice__size_max=1.6, ice__concentration=0.4,
+                                   ice__size_exponent=1.6),
     "ice_region": changed(SHORT, domain__x0=-2, domain__y0=-3, ice=SHORT["ice"] | {
         "x_min": 1, "x_max": 12, "y_min": -2.5, "y_max": 4, "seed": 77, "shake": 5, "size_spread": 0.4,
         "thickness_law": "lognormal", "thickness_spread": 0.35}, body__y=0.5),

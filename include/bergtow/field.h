@@ -28,6 +28,11 @@ typedef struct bt_outline_counts {
     char crs[32];     ///< of the file: "OGC:CRS84" (degrees), "EPSG:32633", "local" (metres); "" for other fields
     int64_t unnamed;  ///< features without a thickness that have a property of nearly this name
     char nearly[96];  ///< such names, the first few
+    int64_t bare;     ///< features without a thickness, whose floes have that of the case
+    int64_t outside;  ///< floes whose centroid is outside the ice region
+    double outside_area; ///< area of floes outside the ice region, which the concentration leaves out, m²
+    /// Of a field file: area that its concentration refers to, and that of the case's ice region, m²; 0 for other fields.
+    double own_area, region_area;
 } bt_outline_counts;
 
 typedef struct bt_field {
@@ -39,7 +44,8 @@ typedef struct bt_field {
     double *thickness;     ///< [n] m
     double *area;          ///< [n] m²
     double ice_area;       ///< m², the area that concentration refers to: ice region less the body's footprint
-    double concentration;  ///< Σ area / ice_area as made
+    double concentration;  ///< Σ area / ice_area as made; of outlines without what lies outside the ice region
+    char frame[16];        ///< domain.frame of the case that a field file was made for; "" where it does not say
     bt_outline_counts outlines; ///< of a field that was read
     bt_idx cap;            ///< floes the arrays have room for
     int64_t cap_vertices;  ///< vertices they have room for
@@ -76,8 +82,8 @@ bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const cha
 /// Has bt_field_write_outlines written this file?
 bool bt_field_outlines_ours(const char *path);
 
-/// Warnings of outlines that were read: properties that are nearly called thickness, what a projection leaves
-/// uncorrected.
+/// Warnings of ice that was read: properties that are nearly called thickness, floes outside the ice region, what a
+/// projection leaves uncorrected, a latitude that is not the case's.
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings);
 
 /// Thickness of floe i by the law of the case, m.
@@ -85,6 +91,9 @@ double bt_field_thickness(const bt_case *c, bt_idx i);
 
 /// Collective. The field of rank 0 to all ranks; f has been initialised.
 void bt_field_share(const bt_comm *c, bt_field *f);
+
+/// Name of the case's domain.frame.
+const char *bt_field_frame(const bt_case *c);
 
 /// Write to an HDF5 file: /floes/{vertices,offsets,pose,thickness,area}, attributes on /floes. A complete file or none.
 /// Errors: BT_ERR_IO.

@@ -9,6 +9,8 @@
 #include "bergtow/world.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_idle.h"
+#include "case/ice_bounds.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
 #include "base/elementary.h"
@@ -116,7 +118,7 @@ static void warn_of_drift(const bt_case *c, const bt_check_ice *n, bt_errors *wa
                       drift);
 }
 
-void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings)
 {
     warn_of_drift(c, n, warnings);
     const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
@@ -125,4 +127,7 @@ void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
     bt_packing_warn(&packing, c->run.duration, warnings);
     warn_of_step(c, n, warnings);
     bt_case_warn_start(c, warnings);
+    bt_case_warn_idle(c, warnings);
+    bt_outline_warn(&f->outlines, c, warnings);
+    if (n->count >= 1) bt_ice_warn(c, n->size, n->thickness, warnings);
 }

@@ -74,9 +74,11 @@ static const struct argp check_argp = {.options = check_options,
                                            "Validate a case and print the numbers that follow from it; or a study, "
                                            "with the case of each of its conditions. Nothing is computed or written."};
 
-static void print_ice(const bt_case *c, const bt_check_ice *n)
+static void print_ice(const bt_case *c, const bt_field *f, const bt_check_ice *n)
 {
-    printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
+    if (c->ice.field) printf("ice area             %.6g m2, of the field file\n", f->ice_area);
+    else
+        printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
     const bool read = bt_case_reads_field(c);
     printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count,
@@ -110,7 +112,7 @@ static void print_line(const bt_case *c)
            c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v, c->tow.vessel.bollard_pull * (1 - r * r));
 }
 
-static void print_outlines(const bt_outline_counts *o, const bt_case *c)
+static void print_outlines(const bt_outline_counts *o)
 {
     if (o->read)
         printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64
@@ -130,10 +132,6 @@ static void print_outlines(const bt_outline_counts *o, const bt_case *c)
         printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled,
                o->hull_area);
     if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);
-    bt_errors warnings = {0};
-    bt_outline_warn(o, c, &warnings);
-    for (size_t i = 0; i < warnings.n; i++) printf("warning: %s\n", warnings.text[i]);
-    bt_errors_free(&warnings);
 }
 
 static void print_body(const bt_case *c)
@@ -304,9 +302,9 @@ static void print_text(const char *path, const bt_case *c, const bt_field *f, co
     printf("%s: valid%s\n", path, warned(warnings->n, text));
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
-    print_ice(c, n);
+    print_ice(c, f, n);
     print_laws(c, n);
-    print_outlines(&f->outlines, c);
+    print_outlines(&f->outlines);
     print_body(c);
     print_width(c, n);
     print_packing(c, n);
@@ -327,7 +325,7 @@ static bt_status print_numbers(const options *o, const bt_case *c, bt_field *f, 
     const bt_status status = bt_check_ready(c, comm, f, &n, &run, &lead, err);
     if (status != BT_OK) return status;
     bt_errors warnings = {0};
-    bt_check_warn(c, &n, &warnings);
+    bt_check_warn(c, f, &n, &warnings);
     if (o->json) bt_check_print_json(o->file.path, c, comm, &n, &run, &warnings);
     else print_text(o->file.path, c, f, comm, &n, &run, &lead, &warnings);
     bt_errors_free(&warnings);

@@ -29,7 +29,7 @@ struct bt_comm;
 bt_status bt_check_ready(const bt_case *c, const struct bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run,
                          bt_lead_stats *lead, bt_errors *err);
 /// What a run would go through and a user should know before: appended to the list, a sentence each.
-void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings);
+void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings);
 /// Of a time step in the printed list.
 static inline const char *bt_check_verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
 bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n);

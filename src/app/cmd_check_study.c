@@ -114,7 +114,7 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
         const bt_check_step step = bt_check_step_of(&c, &n);
         const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
         bt_errors warnings = {0};
-        bt_check_warn(&c, &n, &warnings);
+        bt_check_warn(&c, &f, &n, &warnings);
         *x = (numbers){n.count,
                        (double)bt_case_steps(&c),
                        bt_check_seconds(&c, &n),

@@ -7,6 +7,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
+#include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
 #include "base/largest.h"
@@ -521,6 +522,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check_geographic(&k);
     check_sizes(&k);
     check_outlines(&k);
+    bt_case_check_idle(&k);
     double v[2 * BT_MAX_VERTICES];
     int n;
     bool placed = check_body(&k, &n, v);

@@ -34,6 +34,15 @@ bool bt_check_given(const bt_check *k, const char *key)
     return o && (o->line > 0 || o->set);
 }
 
+bool bt_check_together(const bt_check *k, const char *key, const char *other)
+{
+    if (!bt_check_given(k, key)) return false;
+    const bt_origin *a = origin(k, key), *b = origin(k, other);
+    if (a->place || b->place) return false;
+    if (!bt_check_given(k, other)) return true;
+    return a->set || b->set ? a->set && b->set : !strcmp(bt_check_file(k, key), bt_check_file(k, other));
+}
+
 bool bt_check_sound(const bt_check *k, const char *keys)
 {
     while (k->from && *keys) {

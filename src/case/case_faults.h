@@ -29,6 +29,9 @@ typedef struct bt_check {
 const char *bt_check_file(const bt_check *k, const char *key);
 
 bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
+/// Is a key given where another is, in the same file or both on the command line? A default stands in both, but not in
+/// a study, where another member may have it otherwise.
+bool bt_check_together(const bt_check *k, const char *key, const char *other);
 bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
 void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 

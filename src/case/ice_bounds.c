@@ -118,8 +118,8 @@ const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum
 
 const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT_ICE_WHY])
 {
-    double size = 0, area = 0;
-    for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI), area += f->area[i];
+    double size = 0;
+    for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI);
     const double mean = f->n > 0 ? size / f->n : 0, whole = c->domain.length * c->domain.width;
     if (mean > bt_min(c->domain.length, c->domain.width)) {
         snprintf(why, BT_ICE_WHY,
@@ -135,5 +135,20 @@ const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT
                  f->ice_area, whole);
         return why;
     }
-    return bt_ice_field_fault(false, f->n, size, area, f->ice_area, why);
+    return bt_ice_field_fault(false, f->n, size, f->concentration * f->ice_area, f->ice_area, why);
+}
+
+static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice is seldom so thick, assumed
+
+void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings)
+{
+    const bool deep = c->body.shape != BT_BODY_ABSENT && thickness > c->body.draft;
+    if (!(thickness > THICK) && !(thickness > STOUT * size) && !deep) return;
+    bt_errors_add(warnings,
+                  "the ice is %.3g m thick in the mean, %s; check that it is in metres (ice.thickness, or thickness in "
+                  "the file)",
+                  thickness,
+                  thickness > THICK          ? "more than 10 m"
+                  : thickness > STOUT * size ? "more than a fifth of the floe size"
+                                             : "more than the draft of the body");
 }

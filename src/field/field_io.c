@@ -6,7 +6,8 @@
 //     /floes/pose       [n][3]  x m, y m, yaw rad
 //     /floes/thickness  [n]     m
 //     /floes/area       [n]     m², optional when read
-//     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes
+//     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes, frame (the
+//                       domain.frame that x and y are of)
 //     /case             the resolved case the field was made from
 // A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a
 // checksum (checksum.h): of such a file any damage is refused before HDF5, which crashes on some, reads a byte. A file
@@ -29,6 +30,11 @@
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 #include "base/checksum.h"
+
+const char *bt_field_frame(const bt_case *c)
+{
+    return c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic";
+}
 
 // ---- write ----
 
@@ -58,6 +64,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
         bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
         bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
+        bt_h5_attr_text(&h, "/floes", "frame", bt_field_frame(c));
         char *text = bt_case_resolved(c);
         bt_h5_write_text(&h, "/case", text ? text : "");
         bt_h5_describe(&h, "/case", NULL, NULL, "the case with every key, in SI units");
@@ -78,6 +85,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
 typedef struct reader {
     hid_t file;
     bt_nonconvex nonconvex;
+    bool bare;                ///< without the checksum of this program's files
     bt_outline_counts counts;
     bt_refusals r;
 } reader;
@@ -122,20 +130,54 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
     return data;
 }
 
+/// A number of /floes; NaN where it is missing or none.
+static double read_number(const reader *r, const char *name)
+{
+    double number = NAN;
+    hid_t a = H5Aopen_by_name(r->file, "/floes", name, H5P_DEFAULT, H5P_DEFAULT);
+    if (a < 0) return number;
+    hid_t space = H5Aget_space(a), type = H5Aget_type(a);
+    H5T_class_t class = H5Tget_class(type);
+    bool one = H5Sget_simple_extent_npoints(space) == 1 && (class == H5T_FLOAT || class == H5T_INTEGER);
+    if (one && H5Aread(a, H5T_NATIVE_DOUBLE, &number) < 0) number = NAN;
+    H5Tclose(type);
+    H5Sclose(space);
+    H5Aclose(a);
+    return number;
+}
+
+/// The frame that the file names, or "": files of before do not.
+static void read_frame(const reader *r, char frame[16])
+{
+    *frame = 0;
+    if (r->r.status != BT_OK || H5Aexists_by_name(r->file, "/floes", "frame", H5P_DEFAULT) <= 0) return;
+    hid_t a = H5Aopen_by_name(r->file, "/floes", "frame", H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
+          space = H5Aget_space(a);
+    if (H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1) {
+        hid_t own = H5Tcopy(H5T_C_S1);
+        char *variable = NULL;
+        if (H5Tis_variable_str(type) > 0) {
+            H5Tset_size(own, H5T_VARIABLE);
+            H5Tset_cset(own, H5Tget_cset(type));
+            if (H5Aread(a, own, &variable) >= 0 && variable) snprintf(frame, 16, "%s", variable);
+            H5free_memory(variable);
+        } else {
+            H5Tset_size(own, 16);
+            H5Tset_cset(own, H5Tget_cset(type));
+            if (H5Aread(a, own, frame) < 0) *frame = 0;
+            frame[15] = 0;
+        }
+        H5Tclose(own);
+    }
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Aclose(a);
+}
+
 static double read_ice_area(reader *r)
 {
-    double area = NAN;
-    if (r->r.status != BT_OK) return area;
-    hid_t a = H5Aopen_by_name(r->file, "/floes", "ice_area", H5P_DEFAULT, H5P_DEFAULT);
-    if (a >= 0) {
-        hid_t space = H5Aget_space(a), type = H5Aget_type(a);
-        H5T_class_t class = H5Tget_class(type);
-        bool one = H5Sget_simple_extent_npoints(space) == 1 && (class == H5T_FLOAT || class == H5T_INTEGER);
-        if (one && H5Aread(a, H5T_NATIVE_DOUBLE, &area) < 0) area = NAN;
-        H5Tclose(type);
-        H5Sclose(space);
-        H5Aclose(a);
-    }
+    if (r->r.status != BT_OK) return NAN;
+    const double area = read_number(r, "ice_area");
     if (isnan(area))
         bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
                          "concentration refers to");
@@ -210,6 +252,7 @@ static void read_floes(reader *r, bt_field *f)
         same_length(r, "/floes/area", n_area, n);
     }
     f->ice_area = read_ice_area(r);
+    read_frame(r, f->frame);
     if (r->r.status == BT_OK) {
         f->n = f->cap = (bt_idx)n;
         f->cap_vertices = (int64_t)n_vertices;
@@ -220,7 +263,10 @@ static void read_floes(reader *r, bt_field *f)
             sum += f->area[i];
             size += sqrt(4 * f->area[i] / BT_PI);
         }
+        // Of outlines with floes outside the ice region our own files have a concentration that is less.
         f->concentration = sum / f->ice_area;
+        const double said = r->bare ? NAN : read_number(r, "concentration");
+        if (said < f->concentration * (1 - 1e-9)) f->concentration = said, sum = said * f->ice_area;
         char why[BT_ICE_WHY];
         if (r->r.status == BT_OK && bt_ice_field_fault(false, f->n, size, sum, f->ice_area, why))
             bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
@@ -249,6 +295,7 @@ static void take_hulls(bt_field *f)
         sum += g.area[i];
     }
     g.ice_area = f->ice_area;
+    memcpy(g.frame, f->frame, sizeof g.frame);
     g.concentration = sum / g.ice_area;
     bt_field_free(f);
     *f = g;
@@ -266,7 +313,7 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, b
     }
     int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
     bt_errors found = {0};
-    reader r = {.nonconvex = nonconvex, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
+    reader r = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
     r.file = bt_h5_open_file(path, &errnum);
     if (r.file < 0) bt_errors_add(&found, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
     else if ((r.r.status = bt_h5_whole(r.file, path, &found)) == BT_OK) read_floes(&r, f);

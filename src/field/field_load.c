@@ -6,8 +6,21 @@
 
 #include "bergtow/field.h"
 #include "case/ice_bounds.h"
+#include "case/case_idle.h"
 #include "field/field_admit.h"
+#include "field/field_make.h"
 #include "field/map_crs.h"
+
+/// The area that the file's concentration refers to, and that of the case's ice region.
+static void note_region(const bt_case *c, bt_field *f)
+{
+    bt_region y;
+    bt_errors unheard = {0}; // no room for ice that is to be made: here it is there
+    f->outlines.own_area = f->ice_area;
+    if (bt_region_init(&y, c, 0, &unheard) == BT_OK) f->outlines.region_area = y.ice_area;
+    bt_region_free(&y);
+    bt_errors_free(&unheard);
+}
 
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 {
@@ -17,7 +30,13 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
     if (status != BT_OK) return status;
     bt_refusals r = {.path = c->ice.field, .err = err, .status = BT_OK};
     char why[BT_ICE_WHY];
-    if (bt_ice_domain_fault(c, f, why)) bt_refuse(&r, "%s", why);
+    note_region(c, f);
+    if (*f->frame && strcmp(f->frame, bt_field_frame(c)))
+        bt_refuse(&r,
+                  "was made for domain.frame: %s, whose x and y would lie mirrored in this case's, %s; set "
+                  "domain.frame: %s, or make the field for this frame",
+                  f->frame, bt_field_frame(c), f->frame);
+    else if (bt_ice_domain_fault(c, f, why)) bt_refuse(&r, "%s", why);
     else bt_field_check_apart(c, f, "floe", &r);
     if (r.status == BT_OK) return BT_OK;
     bt_field_free(f);
@@ -26,6 +45,53 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 }
 
 // --- messages --------------------------------------------------------------------------------------------------------
+
+/// Ice and ice region that are not the same.
+static void warn_of_region(const bt_outline_counts *o, bt_errors *warnings)
+{
+    if (o->outside)
+        bt_errors_add(warnings,
+                      "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they are there, and the "
+                      "concentration, which refers to that region, leaves out %.4g m2 of ice outside it",
+                      (long long)o->outside, (long long)o->read, o->outside_area);
+    if (o->own_area > 0 && o->region_area > 0 && fabs(o->own_area / o->region_area - 1) > 0.01)
+        bt_errors_add(warnings,
+                      "ice.field: the concentration of the file refers to %.6g m2, and the domain less the body has "
+                      "%.6g m2: the floes cover only that part of it, as the file has them",
+                      o->own_area, o->region_area);
+}
+
+static void warn_of_latitude(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
+{
+    if (!o->read || !isfinite(o->lat) || c->domain.frame != BT_FRAME_GEOGRAPHIC) return; // a basin lies nowhere
+    const double place = o->lat * 180 / BT_PI, given = c->water.latitude * 180 / BT_PI;
+    if (given == 0 && fabs(place) > 1)
+        bt_errors_add(warnings,
+                      "the outlines lie at latitude %.4g deg, and without water.latitude there is no Coriolis force; "
+                      "set it to %.4g deg",
+                      place, place);
+    else if (fabs(place - given) > 1)
+        bt_errors_add(warnings, "the outlines lie at latitude %.4g deg, and water.latitude is %.4g deg; correct one",
+                      place, given);
+}
+
+/// What a projection does to lengths and directions, by its scale at x = y = 0.
+static void warn_of_plane(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
+{
+    const bt_map_crs crs = bt_map_crs_of(o->crs);
+    if (crs.kind != BT_MAP_PLANE) return;
+    double along, across;
+    bt_map_crs_scale(&crs, o->east, o->north, &along, &across);
+    const bool turned = crs.any_north && c->domain.frame == BT_FRAME_GEOGRAPHIC;
+    bt_errors_add(
+        warnings,
+        "the outlines are metres of %s, used as plane coordinates: its scale factor, at x = y = 0 %.4g along the "
+        "meridian and %.4g across (areas %+.2g %%), and the angle of its north to the true one (convergence%s) are not "
+        "corrected, as `bergtow outlines` does%s",
+        crs.name, along, across, 100 * (along * across - 1),
+        crs.any_north ? ", any angle in a polar projection" : "",
+        turned ? "; x is the grid's north here: give wind, current and tow in that frame" : "");
+}
 
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
 {
@@ -40,13 +106,9 @@ void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *wa
                       "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; "
                       "ice.nonconvex: hull lets them raft, with their hulls' outlines",
                       (long long)o->split);
-    const bt_map_crs crs = bt_map_crs_of(o->crs);
-    if (crs.kind != BT_MAP_PLANE) return;
-    const bool turned = crs.any_north && c->domain.frame == BT_FRAME_GEOGRAPHIC;
-    bt_errors_add(
-        warnings,
-        "the outlines are metres of %s, used as plane coordinates: its scale factor and the angle of its north to the "
-        "true one (convergence%s) are not corrected%s",
-        crs.name, crs.any_north ? ", any angle in a polar projection" : "",
-        turned ? "; x is the grid's north here: give wind, current and tow in that frame, or the file in degrees" : "");
+    if (o->read && !o->bare && c->n_floes == 0 && bt_case_changed(c, "ice.thickness"))
+        bt_errors_add(warnings, "ice.thickness: no effect, for all outlines have a thickness of their own");
+    warn_of_region(o, warnings);
+    warn_of_latitude(o, c, warnings);
+    warn_of_plane(o, c, warnings);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where ice may lie: the ice region, its periodic directions, and the bodies that stand in it.
 #include "field/field_make.h"
+#include "bergtow/outline.h"
 #include "base/elementary.h"
 
 #include <math.h>
@@ -28,6 +29,35 @@ static double area_inside(const bt_region *y, int n, const double *v)
     n = bt_shape_clip(n, b, 0, -1, -y->y0, a);
     n = bt_shape_clip(n, a, 0, 1, y->y1, b);
     return n >= 3 ? bt_shape_moments(n, b).area : 0;
+}
+
+// Of a convex part of a floe, with its images over the edges at which the domain wraps.
+static double part_inside(const bt_region *y, const bt_case *c, int n, const double *v)
+{
+    const int over_x = bt_bound_wraps(c->domain.ends), over_y = c->domain.sides == BT_BOUND_PERIODIC;
+    double sum = 0, at[2 * BT_MAX_VERTICES];
+    for (int ix = -over_x; ix <= over_x; ix++)
+        for (int iy = -over_y; iy <= over_y; iy++) {
+            for (int k = 0; k < n; k++) {
+                at[2 * k] = v[2 * k] + ix * c->domain.length;
+                at[2 * k + 1] = v[2 * k + 1] + iy * c->domain.width;
+            }
+            sum += area_inside(y, n, at);
+        }
+    return sum;
+}
+
+double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const double *v)
+{
+    bt_parts p;
+    if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &p)) return part_inside(y, c, n, v);
+    double sum = 0;
+    for (int i = 0, at = 0; i < p.n; at += p.count[i++]) {
+        double part[2 * BT_MAX_VERTICES];
+        for (int k = 0; k < p.count[i]; k++) memcpy(part + 2 * k, v + 2 * p.corner[at + k], 2 * sizeof *v);
+        sum += part_inside(y, c, p.count[i], part);
+    }
+    return sum;
 }
 
 // Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so

@@ -355,7 +355,7 @@ static void read_feature(reader *s, bt_features *features, size_t index, double 
                  *given = json_object_get(properties, "thickness");
     double thickness = bt_field_thickness(s->c, s->f->n);
     if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
-    else look_for_thickness(s, properties);
+    else look_for_thickness(s, properties), counts->bare++;
     const bt_idx i = s->f->n;
     bt_field_add(s->f, n, v, 0, 0, 0, thickness);
     counts->read++;
@@ -445,15 +445,40 @@ static void choose_coordinates(reader *s, const json_t *root)
     }
 }
 
+/// Area of floe i within the ice region, m²; to the bit that of the floe where nothing of it is outside.
+static double area_in_region(reader *s, const bt_region *y, bt_idx i)
+{
+    const bt_field *f = s->f;
+    const double *p = f->pose + 3 * (size_t)i, *own = f->vertices + 2 * f->offsets[i];
+    const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+    double v[2 * BT_MAX_VERTICES];
+    bool in = true;
+    for (int k = 0; k < n; k++) { // outlines have no yaw
+        v[2 * k] = p[0] + own[2 * k], v[2 * k + 1] = p[1] + own[2 * k + 1];
+        in = in && (y->periodic_x || (v[2 * k] >= y->x0 && v[2 * k] <= y->x1)) &&
+             (y->periodic_y || (v[2 * k + 1] >= y->y0 && v[2 * k + 1] <= y->y1));
+    }
+    if (in) return f->area[i];
+    double x = p[0], z = p[1];
+    bt_region_wrap(y, &x, &z);
+    s->f->outlines.outside += !(x >= y->x0 && x <= y->x1 && z >= y->y0 && z <= y->y1);
+    return bt_region_area_of(y, s->c, n, v);
+}
+
+/// What lies outside the region is there, and is no part of a concentration in it.
 static void set_concentration(reader *s)
 {
     bt_region y;
     const bt_status status = bt_region_init(&y, s->c, 0, s->r.err);
     if (status != BT_OK) s->r.status = status;
-    double sum = 0;
-    for (bt_idx i = 0; i < s->f->n; i++) sum += s->f->area[i];
+    double sum = 0, whole = 0;
+    for (bt_idx i = 0; i < s->f->n && status == BT_OK; i++) {
+        sum += area_in_region(s, &y, i);
+        whole += s->f->area[i];
+    }
     s->f->ice_area = y.ice_area;
     s->f->concentration = status == BT_OK ? sum / y.ice_area : 0;
+    s->f->outlines.outside_area = whole - sum;
     bt_region_free(&y);
 }
 

@@ -11,41 +11,49 @@
 // a metre long. Codes: EPSG registry.
 #include "field/map_crs.h"
 
+#include "bergtow/base.h"
+#include "base/elementary.h"
+
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+static const double EARTH = 6371e3; // m, mean radius
+#define UPS_LATITUDE 81.1145 // deg, at which 0.994 at the pole has become 1
+
 static const struct {
     int first, last;
     bt_map_kind kind;
     bool any_north;
+    double true_lat, offset; // of a polar one
 } known[] = {
-    {4326, 4326, BT_MAP_DEGREES, false}, // WGS 84
-    {4979, 4979, BT_MAP_DEGREES, false}, // the same with a height
-    {4258, 4258, BT_MAP_DEGREES, false}, // ETRS89
-    {4937, 4937, BT_MAP_DEGREES, false}, // the same with a height
-    {4269, 4269, BT_MAP_DEGREES, false}, // NAD83
-    {4617, 4617, BT_MAP_DEGREES, false}, // NAD83 (CSRS)
-    {32601, 32660, BT_MAP_PLANE, false}, // UTM north, WGS 84
-    {32701, 32760, BT_MAP_PLANE, false}, // UTM south
-    {25828, 25838, BT_MAP_PLANE, false}, // UTM, ETRS89
-    {26901, 26923, BT_MAP_PLANE, false}, // UTM, NAD83
-    {3411, 3413, BT_MAP_PLANE, true}, // NSIDC sea ice polar stereographic: Hughes north, south; WGS 84 north
-    {3976, 3976, BT_MAP_PLANE, true}, // NSIDC sea ice polar stereographic south, WGS 84
-    {3031, 3031, BT_MAP_PLANE, true}, // Antarctic polar stereographic
-    {3995, 3996, BT_MAP_PLANE, true}, // Arctic polar stereographic, IBCAO
-    {5041, 5042, BT_MAP_PLANE, true}, // UPS north, south
-    {32661, 32661, BT_MAP_PLANE, true}, // UPS north, other order of axes in the registry
-    {32761, 32761, BT_MAP_PLANE, true}, // UPS south
-    {5936, 5940, BT_MAP_PLANE, true}, // EPSG Alaska, Canada, Greenland, Norway, Russia polar stereographic
-    {3571, 3576, BT_MAP_PLANE, true}, // north pole Lambert azimuthal equal-area, six meridians
-    {6931, 6932, BT_MAP_PLANE, true}, // EASE-Grid 2.0 north, south
-    {3857, 3857, BT_MAP_WARPED, false}, // Pseudo-Mercator of web maps
-    {3395, 3395, BT_MAP_WARPED, false}, // World Mercator
-    {3785, 3785, BT_MAP_WARPED, false}, // Pseudo-Mercator, withdrawn
-    {900913, 900913, BT_MAP_WARPED, false}, // the same, before it had a code
+    {4326, 4326, BT_MAP_DEGREES, false, 0, 0}, // WGS 84
+    {4979, 4979, BT_MAP_DEGREES, false, 0, 0}, // the same with a height
+    {4258, 4258, BT_MAP_DEGREES, false, 0, 0}, // ETRS89
+    {4937, 4937, BT_MAP_DEGREES, false, 0, 0}, // the same with a height
+    {4269, 4269, BT_MAP_DEGREES, false, 0, 0}, // NAD83
+    {4617, 4617, BT_MAP_DEGREES, false, 0, 0}, // NAD83 (CSRS)
+    {32601, 32660, BT_MAP_PLANE, false, 0, 0}, // UTM north, WGS 84
+    {32701, 32760, BT_MAP_PLANE, false, 0, 0}, // UTM south
+    {25828, 25838, BT_MAP_PLANE, false, 0, 0}, // UTM, ETRS89
+    {26901, 26923, BT_MAP_PLANE, false, 0, 0}, // UTM, NAD83
+    {3411, 3413, BT_MAP_PLANE, true, 70, 0}, // NSIDC sea ice polar stereographic: Hughes north, south; WGS 84 north
+    {3976, 3976, BT_MAP_PLANE, true, 70, 0}, // NSIDC sea ice polar stereographic south, WGS 84
+    {3031, 3031, BT_MAP_PLANE, true, 71, 0}, // Antarctic polar stereographic
+    {3995, 3995, BT_MAP_PLANE, true, 71, 0}, // Arctic polar stereographic
+    {3996, 3996, BT_MAP_PLANE, true, 75, 0}, // IBCAO
+    {5041, 5042, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, south
+    {32661, 32661, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, other order of axes in the registry
+    {32761, 32761, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS south
+    {5936, 5940, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // EPSG Alaska, Canada, Greenland, Norway, Russia polar stereographic
+    {3571, 3576, BT_MAP_PLANE, true, 0, 0}, // north pole Lambert azimuthal equal-area, six meridians
+    {6931, 6932, BT_MAP_PLANE, true, 0, 0}, // EASE-Grid 2.0 north, south
+    {3857, 3857, BT_MAP_WARPED, false, 0, 0}, // Pseudo-Mercator of web maps
+    {3395, 3395, BT_MAP_WARPED, false, 0, 0}, // World Mercator
+    {3785, 3785, BT_MAP_WARPED, false, 0, 0}, // Pseudo-Mercator, withdrawn
+    {900913, 900913, BT_MAP_WARPED, false, 0, 0}, // the same, before it had a code
 };
 
 /// Behind the last ':' or '/'.
@@ -80,7 +88,26 @@ bt_map_crs bt_map_crs_of(const char *name)
         snprintf(crs.name, sizeof crs.name, "EPSG:%d", code);
         for (size_t i = 0; i < sizeof known / sizeof *known; i++)
             if (code >= known[i].first && code <= known[i].last)
-                crs.kind = known[i].kind, crs.any_north = known[i].any_north;
+                crs.kind = known[i].kind, crs.any_north = known[i].any_north, crs.true_lat = known[i].true_lat,
+                crs.offset = known[i].offset;
     }
     return crs;
+}
+
+void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *along, double *across)
+{
+    if (!crs->any_north) { // UTM: the cylinder's 0.9996 on the central meridian
+        const double from = (east - 500e3) / (0.9996 * EARTH);
+        *along = *across = 0.9996 * (1 + from * from / 2);
+        return;
+    }
+    const double rho = bt_hypot(east - crs->offset, north - crs->offset);
+    if (crs->true_lat > 0) { // stereographic: rho = R (1 + sin true_lat) tan(c/2), c from the pole
+        const double pole = (1 + bt_sin(crs->true_lat * BT_PI / 180)) / 2, t = rho / (2 * EARTH * pole);
+        *along = *across = pole * (1 + t * t);
+    } else { // equal areas: rho = 2 R sin(c/2)
+        const double half = bt_min(rho / (2 * EARTH), 0.999);
+        *along = sqrt(1 - half * half);
+        *across = 1 / *along;
+    }
 }

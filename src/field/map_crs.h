@@ -16,6 +16,8 @@ typedef enum {
 typedef struct bt_map_crs {
     bt_map_kind kind;
     char name[32];   ///< "OGC:CRS84", "EPSG:32633", "local"; of an unknown one as it is given, cut
+    double true_lat; ///< at which a polar one is true to scale, deg; 0: equal areas, or no polar one
+    double offset;   ///< of its pole, m
     bool any_north;  ///< the grid's north can differ from the true one by any angle: polar projections
 } bt_map_crs;
 
@@ -25,5 +27,9 @@ typedef struct bt_map_crs {
 /// From "EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "http://www.opengis.net/def/crs/OGC/1.3/CRS84" and the like,
 /// whatever the case of the letters.
 bt_map_crs bt_map_crs_of(const char *name);
+
+/// Metres of the map for a metre on the ground at a place of a projection, along and across the meridian of a polar
+/// one, on a sphere: within a thousandth of those on the ellipsoid.
+void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *along, double *across);
 
 #endif

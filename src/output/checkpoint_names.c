@@ -226,6 +226,11 @@ static const row rows[] = {
     {"map/east", "m", "origin in the map, east", "one"},
     {"map/north", "m", "origin in the map, north", "one"},
     {"map/unnamed", "1", "features without a thickness that have a property of nearly this name", "one"},
+    {"ice/bare", "1", "features without a thickness", "one"},
+    {"ice/outside", "1", "floes whose centroid is outside the ice region", "one"},
+    {"ice/outside_area", "m2", "area of floes outside the ice region", "one"},
+    {"ice/own_area", "m2", "area that the concentration of a field file refers to", "one"},
+    {"ice/region_area", "m2", "area of the case's ice region, beside it", "one"},
 };
 
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)

@@ -133,6 +133,15 @@ static const bt_state_row map_rows[] = {
     FIELD(I64, "unnamed", outlines.unnamed),
 };
 
+/// Nor these.
+static const bt_state_row ice_rows[] = {
+    FIELD(I64, "bare", outlines.bare),
+    FIELD(I64, "outside", outlines.outside),
+    FIELD(F64, "outside_area", outlines.outside_area),
+    FIELD(F64, "own_area", outlines.own_area),
+    FIELD(F64, "region_area", outlines.region_area),
+};
+
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
 
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
@@ -613,6 +622,7 @@ static void save_field_head(const bt_field *f, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
     bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
+    bt_snapshot_add_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
     bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
     bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
@@ -646,6 +656,8 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
         if (f->outlines.read)
             snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
     }
+    if (bt_snapshot_find(s, "ice/bare")) bt_snapshot_take_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
+    else f->outlines.bare = f->outlines.read; // not known: no warning
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
     f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);

@@ -9,6 +9,8 @@
 #include "output/summary.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_idle.h"
+#include "case/ice_bounds.h"
 #include "estimate/packing.h"
 #include "output/summary_window.h"
 #include "base/elementary.h"
@@ -196,6 +198,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
+    if (t->mean_thickness > 0) bt_ice_warn(c, t->mean_size, t->mean_thickness, &s->warnings);
     warn_of_events(s, t->events);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
@@ -259,6 +262,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->ns_per_floe_step =
         n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 
+    bt_case_warn_idle(c, &s->warnings);
     warn_of_solver(s, h, c, t);
     warn_of_bodies(s, h, c, t);
 }

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt,
 `check` calls valid with a warning."""
+import json
 import os
 
 import pytest
 
-from harness import CASE, DONE, IO, TOW, call, changed, run, write_case
+from harness import CASE, DONE, IO, TOW, call, changed, reading, run, write_case
 
 GB = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
 PIER = {"shape": "square", "length": 1, "x": 6, "y": 0, "fixed": True}
@@ -23,11 +24,33 @@ REFUSED = {
     "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False},
                                                   PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
     "a floe on the body": (changed(WATER, floes=[PIER | {"x": 3, "y": 1, "fixed": False}]), CASE, "overlap by"),
-    "a field that is not there": (changed(TOW, ice__field="none.h5"), IO, "none.h5"),
-    "no field": (changed(TOW, ice__field="case.yml"), CASE, "case.yml"),
+    "a field that is not there": (reading(TOW, "none.h5"), IO, "none.h5"),
+    "no field": (reading(TOW, "case.yml"), CASE, "case.yml"),
     "a table that is not there": (changed(TOW, water__current_table="none.csv"), IO, "none.csv"),
     "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "at most 20000000 are simulated"),
 }
+
+
+IDLE = "ice.concentration, ice.size: no effect on ice that is read from a file"
+
+
+def test_keys_that_the_ice_leaves_unused(tmp_path):
+    """Beside the file that is read they are refused, each with its line; of a base, or where the file is set, the run
+    says so, and what it leaves runs again."""
+    call("field", write_case(tmp_path, TOW), "-o", tmp_path / "f.h5")
+    r = call("check", write_case(tmp_path, changed(TOW, ice__field="f.h5", ice__thickness=1)))
+    assert r.returncode == CASE and [line.split(": ")[2] for line in r.stderr.splitlines()] == [
+        "ice.concentration", "ice.size", "ice.thickness"]
+    base = write_case(tmp_path, TOW, "base.yml")
+    write_case(tmp_path, {"base": "base.yml", "ice": {"field": "f.h5"}}, "over.yml")
+    for words in (["over.yml"], [base, "--set", "ice.field=f.h5"]):
+        r = call("check", *words, cwd=tmp_path)
+        assert r.returncode == DONE and IDLE in r.stdout
+        r = call("run", *words, "-o", tmp_path / "out", "--force", "--quiet", "--set", "run.duration=2",
+                 cwd=tmp_path)
+        assert IDLE in json.loads((tmp_path / "out/summary.json").read_text())["warnings"]
+    again = call("check", tmp_path / "out/case.resolved.yml")
+    assert again.returncode == DONE and IDLE in again.stdout
 
 
 def both(folder, case):
@@ -57,7 +80,7 @@ def test_memory_beyond_the_machine(tmp_path):
 
 def test_a_field_of_another_domain(tmp_path):
     assert call("field", write_case(tmp_path, TOW), "-o", tmp_path / "field.h5").returncode == DONE
-    checked, ran = both(tmp_path, changed(TOW, ice__field="field.h5", domain__x0=4, body__x=7))
+    checked, ran = both(tmp_path, changed(reading(TOW, "field.h5"), domain__x0=4, body__x=7))
     assert ran.returncode == CASE and "field.h5: floe 0" in ran.stderr
     assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
 

@@ -5,7 +5,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, IO, area, call, changed, differing, overlap, placed, run, worst_overlap, write_case
+from harness import (CASE, DONE, IO, area, call, changed, differing, overlap, placed, reading, run, worst_overlap,
+                     write_case)
 
 BASE = {
     "run": {"dt": 0.1, "duration": 1},
@@ -25,7 +26,8 @@ FIELDS = {
                          ice__size_spread=0.5,
                          ice__thickness_law="lognormal",
                          ice__thickness_spread=0.3),
-    "power": changed(BASE, ice__size_law="power", ice__size_min=0.4, ice__size_max=2.5, ice__size_exponent=1.8),
+    "power": changed(BASE, ice__size=None, ice__size_law="power", ice__size_min=0.4, ice__size_max=2.5,
+                     ice__size_exponent=1.8),
     "periodic": changed(BASE, domain__ends="periodic", domain__sides="periodic"),
     "region": changed(BASE, ice__x_min=6, ice__x_max=15, ice__y_min=-4, ice__y_max=2.5),
     "ship": changed(BASE, body={"shape": "ship", "length": 4, "width": 1.5, "x": 8, "yaw": 33}, ice__concentration=0.8),
@@ -245,5 +247,5 @@ def test_what_cannot_be_made_or_written_is_refused(tmp_path):
 
 def test_a_field_for_another_body_is_refused(tmp_path):
     make(tmp_path, BASE)
-    moved = run(tmp_path, changed(BASE, ice__field="field.h5", body__x=9), code=CASE)
+    moved = run(tmp_path, changed(reading(BASE, "field.h5"), body__x=9), code=CASE)
     assert "overlap" in moved.result.stderr

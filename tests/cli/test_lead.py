@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, area, call, changed, placed, run, worst_overlap, write_case
+from harness import CASE, area, call, changed, placed, reading, run, worst_overlap, write_case
 
 # A body of 2 m in half-open ice of 0.8 m.
 BASE = {
@@ -70,7 +70,7 @@ def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     case = changed(BASE, lead=MANAGED, run__duration=2)
     made = run(tmp_path, case, name="made")
     assert call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").returncode == 0
-    read = run(tmp_path, changed(case, ice__field="f.h5"), name="read")
+    read = run(tmp_path, reading(case, "f.h5"), name="read")
     assert made.hash == read.hash and made.summary["lead"] == read.summary["lead"]
     result = call("check", tmp_path / "case.yml")
     lead = made.summary["lead"]

@@ -6,6 +6,7 @@ The reader of the files here is Python's own json, and the places on the ellipso
 formulas.
 """
 import json
+import re
 import math
 import re
 
@@ -452,3 +453,31 @@ def test_absurd_values_of_a_case(tmp_path, key, value):
     case = changed(FRAMES["basin"], ice={"concentration": 0.1, "size": 20, key: value})
     result = call("check", write_case(tmp_path, case))
     assert result.returncode == CASE and f"ice.{key}: " in result.stderr and "below" in result.stderr
+
+
+# ---- what the place on the earth says ----
+
+
+@pytest.mark.parametrize("latitude, says", [(0, "without water.latitude there is no Coriolis force; set it to 7"),
+                                            (-60, "and water.latitude is -60 deg; correct one"), (LAT, None)])
+def test_the_latitude_of_the_map_and_of_the_case(tmp_path, latitude, says):
+    write(tmp_path, lonlat(ARROW))
+    r = call("check", write_case(tmp_path, changed(FRAMES["geographic"], water__latitude=latitude)))
+    assert r.returncode == DONE, r.stderr
+    assert ("the outlines lie at latitude" in r.stdout) == (says is not None) and (says or "") in r.stdout
+
+
+# x = y = 0 on the meridian of a polar map, and the scale there [Snyder 1987, tables 23 and 29, spheres]
+@pytest.mark.parametrize("crs, north, along, across", [("EPSG:3413", -3323680, 1.0395, 1.0395),
+                                                       ("EPSG:3413", -1.5e6, 0.9842, 0.9842),
+                                                       ("EPSG:6931", -3298000, 0.9659, 1.0353),
+                                                       ("EPSG:32661", 2e6, 0.994, 0.994),
+                                                       ("EPSG:32633", 8.5e6, 0.9996, 0.9996)])
+def test_the_scale_of_a_projection_is_said(tmp_path, crs, north, along, across):
+    east = 500e3 if crs == "EPSG:32633" else 2e6 if crs == "EPSG:32661" else 0
+    write(tmp_path, shift(ARROW, east, north), **named(crs))
+    case = changed(FRAMES["geographic"], ice__origin_east=east, ice__origin_north=north)
+    r = call("check", write_case(tmp_path, case))
+    assert r.returncode == DONE, r.stderr
+    said = re.search(r"scale factor, at x = y = 0 ([\d.]+) along the meridian and ([\d.]+) across", r.stdout)
+    assert (float(said[1]), float(said[2])) == pytest.approx((along, across), abs=1e-3)

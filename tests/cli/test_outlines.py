@@ -256,7 +256,7 @@ def test_field_files_with_bays(tmp_path):
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
     split = changed(BASE, ice__nonconvex="split")
     field(tmp_path, split)
-    stored = changed(BASE, ice={"field": "out.h5", "thickness": 0.25})
+    stored = changed(BASE, ice={"field": "out.h5"})
     r = call("check", write_case(tmp_path, stored))
     assert r.returncode == CASE and "floe 0" in r.stderr and "not convex" in r.stderr and "ice.nonconvex" in r.stderr
     a = run(tmp_path, split, name="a")
@@ -386,3 +386,78 @@ def test_the_shipped_example(tmp_path):
     assert r.summary["unconverged_steps"] == 0 and r.summary["momentum_residual"] < 1e-9
     assert r.series("ice_resistance").max() > 0
     assert r.summary["max_overlap_relative"] < 0.01
+
+
+# ---- what the ice is for the case that reads it ----
+
+
+def warnings_of(folder, case, *words):
+    r = call("check", write_case(folder, case), "--json", *words)
+    assert r.returncode == DONE, r.stderr
+    return json.loads(r.stdout)["warnings"], json.loads(r.stdout)["ice"]["concentration"]
+
+
+def test_the_concentration_is_that_of_the_ice_region(tmp_path):
+    """A floe outside is left out, of one on the edge the part inside counts, with bays or without; a field file that
+    is made of them keeps it."""
+    write(tmp_path, feature(at(SQUARE, 5, 3)), feature(at(SQUARE, 9.25, 0)), feature(at(SQUARE, 14, 0)),
+          feature(at(C_SHAPE, 9, 2)))
+    case = changed(BASE, ice__x_max=10, ice__nonconvex="split")
+    warned, concentration = warnings_of(tmp_path, case)
+    ground = 10 * 10 - math.pi
+    assert concentration == pytest.approx((1 + 0.75 + 1.5) / ground, rel=2e-3)
+    assert any("1 of 4 floes lie outside the ice region" in w and "leaves out 2.25 m2" in w for w in warned)
+    assert not any("outside" in w for w in warnings_of(tmp_path, changed(case, ice__x_max=None))[0])
+    field(tmp_path, case)
+    again = changed(BASE, ice={"field": "out.h5", "nonconvex": "split"})
+    warned, read_again = warnings_of(tmp_path, again)
+    assert read_again == pytest.approx(concentration, rel=1e-12)
+    assert any("refers to 96.8" in w and "the domain less the body has 196.8" in w for w in warned)
+
+
+def test_over_a_periodic_edge_a_floe_counts_whole(tmp_path):
+    write(tmp_path, feature(at(SQUARE, 19.25, 0)), feature(at(SQUARE, 8, 0)))
+    case = changed(BASE, domain__ends="periodic")
+    assert warnings_of(tmp_path, case)[1] == pytest.approx(2 / (200 - math.pi), rel=2e-3)
+    part = changed(case, ice__x_max=10)
+    assert warnings_of(tmp_path, part)[1] == pytest.approx(1.25 / (100 - math.pi), rel=2e-3)
+
+
+def test_a_field_of_the_other_frame(tmp_path):
+    """Its x and y would lie mirrored. A file that does not say its frame is read."""
+    write(tmp_path, feature(at(SQUARE, 8, 0)))
+    field(tmp_path, BASE)
+    other = changed(BASE, ice={"field": "out.h5"}, domain__frame="geographic", domain__x0=0, domain__y0=-5,
+                    body__draft=1)
+    r = call("check", write_case(tmp_path, other))
+    assert r.returncode == CASE and "out.h5: was made for domain.frame: basin" in r.stderr
+    with h5py.File(tmp_path / "out.h5", "r+") as f:
+        assert f["floes"].attrs["frame"] == "basin"
+        f["floes"].attrs["frame"] = "geographic"
+        del f["floes"].attrs["frame"]
+        floes = {k: v[:] for k, v in f["floes"].items()}
+        area_of_ice = f["floes"].attrs["ice_area"]
+    with h5py.File(tmp_path / "out.h5", "w") as f:  # without the checksum
+        g = f.create_group("floes")
+        for name, values in floes.items():
+            g[name] = values
+        g.attrs["ice_area"] = area_of_ice
+    warnings_of(tmp_path, other)
+
+
+@pytest.mark.parametrize("changes, says", [({"thickness": 10.5}, "more than 10 m"),
+                                           ({"thickness": 0.25}, "more than a fifth of the floe size"),
+                                           ({"thickness": 0.2}, "more than the draft"), ({"thickness": 0.1}, None)])
+def test_a_thickness_that_may_be_in_centimetres(tmp_path, changes, says):
+    write(tmp_path, feature(at(SQUARE, 8, 0), properties=changes))
+    case = changed(BASE, ice__thickness=None, body__draft=0.15)
+    warned = [w for w in warnings_of(tmp_path, case)[0] if "check that it is in metres" in w]
+    assert len(warned) == (says is not None) and all(says in w for w in warned)
+
+
+def test_a_thickness_of_the_case_that_no_floe_has(tmp_path):
+    write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}))
+    says = "ice.thickness: no effect, for all outlines have a thickness of their own"
+    assert says in warnings_of(tmp_path, BASE)[0]
+    write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}), feature(at(SQUARE, 12, 0)))
+    assert says not in warnings_of(tmp_path, BASE)[0]

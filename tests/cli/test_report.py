@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -27,6 +28,7 @@ import replay as replay_data  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
 import report_run  # noqa: E402
+import statement  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import Run  # noqa: E402
 
@@ -624,6 +626,8 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
                 tmp_path / "made.geojson").returncode == 0
     drawn = json.loads((tmp_path / "made.geojson").read_text())
 
+    said = []  # of a design statement
+
     def run_of(name, thicknesses):
         for feature, t in zip(drawn["features"], thicknesses):
             feature["properties"] = {} if t is None else {"thickness": t}
@@ -632,6 +636,8 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
         with Run(r.dir) as opened_run:
             values = report_case.values(opened_run)
             groups = report_run.key_values(opened_run, values)
+            members = SimpleNamespace(folder=lambda m: r.dir)
+            said.append({k: statement.case_of(members, [0]).texts[k] for k in ("ice.size", "ice.thickness")})
         return r, {v.key: (v.value, v.kind) for v in groups["Ice"]}, {v.key: v for v in values}
 
     n = len(drawn["features"])
@@ -647,6 +653,7 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
     } & set(ice) and "ice.friction" in ice
     assert (every["ice.size"].kind == "unused"
             and every["ice.size"].origin == "not used: the ice is read by ice.outlines")
+    assert said == [{"ice.size": f"{size.mean():.3g} m", "ice.thickness": "0.7 m"}]
     text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
     assert ice["floe size"][0] in text and "as read" in text
     some = run_of("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first

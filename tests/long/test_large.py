@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import changed, write_case
+from harness import changed, reading, write_case
 from resuming import assert_same_result, check_readable, children, done, started
 
 FOUR = 1 << 32
@@ -49,7 +49,7 @@ def field(tmp_path_factory):
 def test_a_result_beyond_four_gigabytes(tmp_path, field):
     """Killed when more than that is written, taken up: as the run that was never stopped, which one rank
     has written and packed."""
-    write_case(tmp_path, changed(LOOSE, run__duration=200, output__checkpoint_steps=40, ice__field=str(field)))
+    write_case(tmp_path, changed(reading(LOOSE, field), run__duration=200, output__checkpoint_steps=40))
     p = started(2, "run", "case.yml", "-o", "killed", "--quiet", "--threads", 1, cwd=tmp_path)
     part = tmp_path / "killed/result.h5.tmp"
     while p.poll() is None and not (part.exists() and part.stat().st_size > 1.02 * FOUR):
@@ -83,8 +83,8 @@ def ranks_of(launcher):
 def test_a_rank_dies_in_a_checkpoint_of_300000_floes(tmp_path, field, rank):
     """kill -9 to one of two ranks while the file is being written: the launcher ends the other, the checkpoint before
     it still stands, and the run that goes on from it ends as the one that was never stopped."""
-    write_case(tmp_path, changed(LOOSE, run__duration=12, output__frame_interval=12, output__checkpoint_steps=2,
-                                 ice__field=str(field)))
+    write_case(tmp_path, changed(reading(LOOSE, field), run__duration=12, output__frame_interval=12,
+                                 output__checkpoint_steps=2))
     done(2, "run", "case.yml", "-o", "whole", "--quiet", "--threads", 1, cwd=tmp_path, timeout=600)
     within = 0
     for delay in (0, 0.05, 0.2):

@@ -43,7 +43,7 @@ SEAMS = {
     "run": {"dt": 0.2, "duration": 100},
     "domain": {"length": 30, "width": 24, "ends": "periodic", "sides": "periodic"},
     "ice": {
-        "concentration": 0.6, "size": 1, "size_law": "power", "size_min": 0.6, "size_max": 3, "size_exponent": 2,
+        "concentration": 0.6, "size_law": "power", "size_min": 0.6, "size_max": 3, "size_exponent": 2,
         "thickness_law": "lognormal"
     },
     "body": {"shape": "none"},

@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import call, changed, run
+from harness import call, changed, reading, run
 
 # Loose enough that no jam decides on the force: in one, a single contact more or less is another history.
 CASE = {
@@ -44,7 +44,7 @@ def runs(tmp_path_factory):
         assert result.returncode == 0, result.stderr
         order = np.random.default_rng(seed).permutation(made.summary["n_floes"])
         permute(folder / "made.h5", folder / "other.h5", order)
-        other = run(folder, changed(case, ice__field="other.h5"), "--threads", 1, "--quiet", name="other")
+        other = run(folder, reading(case, "other.h5"), "--threads", 1, "--quiet", name="other")
         smooth = run(folder, changed(case, ice__friction=0), "--threads", 1, "--quiet", name="smooth")
         found.append((order, made, other, smooth))
     return found

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import PRESS, TOW, call, changed, differing, environment, run
+from harness import PRESS, TOW, call, changed, differing, environment, reading, run
 
 ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 
@@ -158,11 +158,11 @@ def test_a_field_read_back_is_the_field_made(tmp_path, case):
     made = run(tmp_path, case, name="made")
     result = call("field", tmp_path / "case.yml", "-o", tmp_path / "field.h5")
     assert result.returncode == 0, result.stderr
-    read = run(tmp_path, changed(case, ice__field="field.h5"), name="read")
+    read = run(tmp_path, reading(case, "field.h5"), name="read")
     assert made.hash == read.hash
     # The second run had the field from the file: another seed makes no difference to it, but does to a field that is
     # made.
-    seed = run(tmp_path, changed(case, ice__field="field.h5", ice__seed=99), name="seed")
+    seed = run(tmp_path, changed(reading(case, "field.h5"), ice__seed=99), name="seed")
     other = run(tmp_path, changed(case, ice__seed=99), name="other")
     assert seed.hash == made.hash != other.hash
     assert differing(made.dir / "result.h5", read.dir / "result.h5", but=("/case", "/case_as_given")) == []

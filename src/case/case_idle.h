@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// Keys of the ice that have no effect beside what another key says.
+#ifndef BERGTOW_CASE_IDLE_H
+#define BERGTOW_CASE_IDLE_H
+
+#include "case/case_faults.h"
+
+/// Refuse those that stand in the file that makes them useless, or are both set beside it.
+void bt_case_check_idle(const bt_check *k);
+
+/// Warn of the others, which a base or a study may have brought along.
+void bt_case_warn_idle(const bt_case *c, bt_errors *warnings);
+
+/// Has a key of a number or a choice another value than its default?
+bool bt_case_changed(const bt_case *c, const char *key);
+
+#endif
