@@ -179,9 +179,9 @@ typedef struct bt_force_series {
     bool part;                 ///< it is counted in a sum, too: what sums up the forces on the body leaves it out
 } bt_force_series;
 
-/// those that are no part first, in the order of the table
+/// in the order of the laws, a sum before its first part; what is there keeps its place when laws are added
 extern bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES];
-extern int bt_n_force_series, bt_n_force_wholes;                ///< all; those that are no part
+extern int bt_n_force_series;
 
 /// Index into bt_force_series_of, −1 = none.
 int bt_force_series_find(const char *name);

@@ -66,7 +66,7 @@ typedef struct bt_quantity {
     size_t offset;           ///< of its place in bt_sample; set for a registered one
 } bt_quantity;
 
-/// Add a quantity before any run begins. It is copied; its texts and context must outlive every run.
+/// Add a quantity; it is recorded in runs that begin later. It is copied; its texts and context must outlive every run.
 /// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no
 /// room.
 bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err);

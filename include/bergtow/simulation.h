@@ -19,7 +19,8 @@
 // Threads. One thread of the program makes all calls, of all simulations; a simulation uses threads of OpenMP within a
 // step. Functions that a program adds to the table of force laws are called by those threads at once; applied forces
 // (bergtow/applied.h) and quantities by one. Several simulations may exist and be stepped in turn. What a program adds
-// (laws, applied forces, quantities, keys, shapes) is of the process, and comes before the simulations that use it.
+// (laws, applied forces, quantities, keys, shapes) is of the process, and comes before the simulations that use it; one
+// that exists already goes on without it. No law and no force acts while an ice field is made.
 //
 // Signals. None is caught, unless options.signals asks for the handlers of the program, from create to end. While METIS
 // cuts the field into parts for several ranks, SIGTERM waits.

@@ -142,6 +142,7 @@ typedef struct bt_params {
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets cells and skin, m
     double law_own[BT_MAX_LAWS][BT_MAX_CONTACT_OWN]; ///< numbers of each contact law; units as it says
+    int added_laws;        ///< contact laws of a program (contact.h) that act here: the first so many
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's

@@ -21,11 +21,13 @@ bool bt_added_add(const bt_contact_law *law)
     return true;
 }
 
-void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN])
+void bt_added_setup(const bt_case *c, bt_params *p)
 {
+    p->added_laws = n_added;
     for (int k = 0; k < n_added; k++) {
-        bt_keys_values(c, added[k]->name, added[k]->keys, added[k]->n_keys, own[k]);
-        if (added[k]->setup) added[k]->setup(c, own[k]);
+        double *own = p->law_own[BT_LAWS + k];
+        bt_keys_values(c, added[k]->name, added[k]->keys, added[k]->n_keys, own);
+        if (added[k]->setup) added[k]->setup(c, own);
     }
 }
 
@@ -35,7 +37,7 @@ static const double *own_of(const bt_params *p, int law) { return p->law_own[law
 
 bool bt_added_on(const bt_params *p, int law)
 {
-    return law - BT_LAWS < n_added && added[law - BT_LAWS]->on(own_of(p, law));
+    return law - BT_LAWS < p->added_laws && added[law - BT_LAWS]->on(own_of(p, law));
 }
 
 bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b)

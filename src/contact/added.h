@@ -13,7 +13,7 @@
 /// A law that has been checked (register.c), after those that are there. False: there is no room.
 bool bt_added_add(const bt_contact_law *law);
 
-/// False where there is no law of this number.
+/// False of a law that the world is without.
 bool bt_added_on(const bt_params *p, int law);
 bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
 
@@ -41,7 +41,7 @@ int bt_added_sums(void);
 /// Their sums into the numbers of the step.
 void bt_added_stats(bt_step_stats *st, const bt_totals *t);
 
-/// Their numbers from a case.
-void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN]);
+/// For a world of a case: those that there are now, and their numbers.
+void bt_added_setup(const bt_case *c, bt_params *p);
 
 #endif

@@ -38,7 +38,7 @@ void bt_laws_setup(const bt_case *c, bt_params *p)
 {
     for (int law = 0; law < BT_LAWS; law++)
         if (bt_laws[law]->setup) bt_laws[law]->setup(c, p->law_own[law]);
-    bt_added_setup(c, p->law_own + BT_LAWS);
+    bt_added_setup(c, p);
 }
 
 bool bt_law_on(const bt_params *p, int law)
@@ -88,7 +88,7 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     *l = (bt_limit){
         .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}};
     for (int law = 0; law < BT_ALL_LAWS; law++) l->record[law] = -1;
-    if (m->n_points > 0 && bt_n_contact_laws() > 0)
+    if (m->n_points > 0 && w->par.added_laws > 0)
         memcpy(l->closes, bt_law_closing(w, t, j, m).point, sizeof l->closes);
     // The last first: what has rafted is not measured from what was crushed before.
     for (int law = BT_ALL_LAWS - 1; m->n_points > 0 && law >= BT_LAWS; law--)

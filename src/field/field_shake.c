@@ -16,6 +16,7 @@
 
 #include "bergtow/world.h"
 #include "field/field_make.h"
+#include "force/forces.h"
 #include "base/elementary.h"
 #include "base/rng.h"
 
@@ -182,6 +183,7 @@ bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, doub
         .rest_speed = 0, .size = size,
     };
     bt_world *w = bt_world_create(&par);
+    bt_forces_leave_added(w->forces); // the ice follows from the case alone
     add_floes(w, c, f, size, stage);
     add_surroundings(w, y, bt_max(4 * largest, size));
 

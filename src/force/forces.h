@@ -10,6 +10,9 @@ bt_forces *bt_forces_create(void);
 /// Release them; NULL is ignored.
 void bt_forces_free(bt_forces *f);
 
+/// The world is none that a program's laws are meant for, as that of a field that is made: without those it has added.
+void bt_forces_leave_added(bt_forces *f);
+
 /// The numbers of all laws from a case. Without a case a program sets w->forces->own itself; they are 0 before.
 void bt_forces_setup(bt_world *w, const bt_case *c);
 

@@ -14,7 +14,7 @@ const bt_force_law *bt_force_laws[BT_MAX_FORCE_LAWS] = {BT_FORCE_LAWS(POINTER)};
 int bt_n_force_laws = BT_LISTED_LAWS;
 
 bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES];
-int bt_n_force_series, bt_n_force_wholes;
+int bt_n_force_series;
 
 int bt_force_series_find(const char *name)
 {
@@ -28,19 +28,11 @@ static void add_series(const char *name, const bt_force_law *law, bool part)
     if (bt_force_series_find(name) < 0) bt_force_series_of[bt_n_force_series++] = (bt_force_series){name, law, part};
 }
 
-/// Those that are no part first: what sums up the forces adds them in this order.
-static void find_series(void)
+/// After those that are there: a world knows its series by their places, so that none may move.
+static void add_series_of(const bt_force_law *law)
 {
-    bt_n_force_series = 0;
-    for (int k = 0; k < bt_n_force_laws; k++) {
-        const bt_force_law *law = bt_force_laws[k];
-        if (law->part_of) add_series(law->part_of, NULL, false);
-        else if (!law->turns_only) add_series(law->name, law, false);
-    }
-    bt_n_force_wholes = bt_n_force_series;
-    for (int k = 0; k < bt_n_force_laws; k++)
-        if (bt_force_laws[k]->part_of && !bt_force_laws[k]->turns_only)
-            add_series(bt_force_laws[k]->name, bt_force_laws[k], true);
+    if (law->part_of) add_series(law->part_of, NULL, false);
+    if (!law->turns_only) add_series(law->name, law, law->part_of != NULL);
 }
 
 // --- a law of a program ----------------------------------------------------------------------------------------------
@@ -56,9 +48,11 @@ static bool add_keys(const bt_force_law *law, bt_errors *err)
 __attribute__((constructor(101))) static void begin(void)
 {
     bt_errors err = {0};
-    for (int k = 0; k < bt_n_force_laws; k++) add_keys(bt_force_laws[k], &err);
+    for (int k = 0; k < bt_n_force_laws; k++) {
+        add_keys(bt_force_laws[k], &err);
+        add_series_of(bt_force_laws[k]);
+    }
     bt_keys_fault(&err);
-    find_series();
 }
 
 bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
@@ -77,7 +71,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
         bt_errors_add(err, "force law %s: there are %d laws; raise BT_MAX_FORCE_LAWS", name, BT_MAX_FORCE_LAWS);
     if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;
-    find_series();
+    add_series_of(law);
     return BT_OK;
 }
 
@@ -94,6 +88,8 @@ bt_forces *bt_forces_create(void)
 }
 
 void bt_forces_free(bt_forces *f) { free(f); }
+
+void bt_forces_leave_added(bt_forces *f) { f->n = BT_LISTED_LAWS; }
 
 void bt_forces_setup(bt_world *w, const bt_case *c)
 {

@@ -32,13 +32,8 @@ static void add_quantity(const bt_force_series *of)
 void bt_force_quantities(void)
 {
     static int known; // series of the table that have been looked at
-    static bool added[BT_MAX_FORCE_SERIES];
-    if (known == bt_n_force_series) return;
-    known = bt_n_force_series;
-    for (int k = 0; k < bt_n_force_wholes; k++) {
-        const bt_force_series *of = &bt_force_series_of[k];
-        if (has_series(of) || added[k]) continue;
-        added[k] = true;
-        add_quantity(of);
+    for (; known < bt_n_force_series; known++) {
+        const bt_force_series *of = &bt_force_series_of[known];
+        if (!of->part && !has_series(of)) add_quantity(of);
     }
 }

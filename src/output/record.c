@@ -34,7 +34,7 @@ static void create_series(bt_record *r)
     bt_h5_group(&r->h5, "/series");
     const int64_t every = r->c->output.sample_every;
     bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
-    for (int k = 0; k < bt_n_series(); k++) {
+    for (int k = 0; k < r->n_series; k++) {
         const bt_quantity *f = bt_series(k);
         char *name = bt_file_join("/series", f->name);
         r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
@@ -47,7 +47,7 @@ static void create_series(bt_record *r)
         if (f->summary) bt_h5_attr_text(&r->h5, name, "summary", f->summary);
         free(name);
     }
-    for (int k = 0; k < bt_n_series(); k++) { // when their time is there
+    for (int k = 0; k < r->n_series; k++) { // when their time is there
         char *name = bt_file_join("/series", bt_series(k)->name);
         bt_h5_axes(&r->h5, name, "time");
         free(name);
@@ -100,7 +100,7 @@ static void record_free(bt_record *r)
 /// Close datasets and file; returns the status of everything that went to the file.
 static bt_status close_file(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series(); k++)
+    for (int k = 0; k < r->n_series; k++)
         if (r->series[k] >= 0) H5Dclose(r->series[k]);
     for (int k = 0; k < 4; k++)
         if (r->events[k] >= 0) H5Dclose(r->events[k]);
@@ -144,10 +144,11 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     r->towed = b->towed;
     r->last_flush = bt_clock();
     bt_history_init(&r->history);
-    r->merged = bt_alloc((size_t)bt_n_series(), sizeof *r->merged);
-    r->buffer = bt_alloc((size_t)bt_n_series() * BT_RECORD_BUFFER, sizeof *r->buffer);
-    r->series = bt_alloc((size_t)bt_n_series(), sizeof *r->series);
-    for (int k = 0; k < bt_n_series(); k++) r->series[k] = -1;
+    r->n_series = bt_n_series();
+    r->merged = bt_alloc((size_t)r->n_series, sizeof *r->merged);
+    r->buffer = bt_alloc((size_t)r->n_series * BT_RECORD_BUFFER, sizeof *r->buffer);
+    r->series = bt_alloc((size_t)r->n_series, sizeof *r->series);
+    for (int k = 0; k < r->n_series; k++) r->series[k] = -1;
     for (int k = 0; k < 4; k++) r->events[k] = -1;
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
@@ -210,7 +211,7 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 
 void bt_record_flush(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series(); k++)
+    for (int k = 0; k < r->n_series; k++)
         bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, (hsize_t)r->written, (hsize_t)r->buffered,
                      r->buffer + (size_t)k * BT_RECORD_BUFFER);
     r->written += r->buffered;
@@ -223,7 +224,7 @@ void bt_record_flush(bt_record *r)
 /// Move the merged steps to the buffer as one entry.
 static void end_entry(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series(); k++) {
+    for (int k = 0; k < r->n_series; k++) {
         double value = r->merged[k];
         if (bt_series(k)->keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
         r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
@@ -239,7 +240,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     r->h5.err = err;
     bt_history_add(&r->history, s);
     bt_impact_store_take(&r->impacts, s->time);
-    for (int k = 0; k < bt_n_series(); k++) {
+    for (int k = 0; k < r->n_series; k++) {
         double *m = &r->merged[k];
         const double x = bt_sample_value(s, bt_series(k));
         switch (r->n_merged ? bt_series(k)->keep : BT_KEEP_LAST) {

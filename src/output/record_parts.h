@@ -22,10 +22,11 @@ struct bt_record {
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
     // series
-    hid_t *series;         ///< [bt_n_series()]
-    double *buffer;        ///< [bt_n_series()][BT_RECORD_BUFFER]
+    int n_series;          ///< there were when the run began; any that a program adds later are not its own
+    hid_t *series;         ///< [n_series]
+    double *buffer;        ///< [n_series][BT_RECORD_BUFFER]
     int64_t written, buffered;
-    double *merged;        ///< [bt_n_series()] of the steps of the present entry
+    double *merged;        ///< [n_series] of the steps of the present entry
     int64_t n_merged;
     double last_flush;     ///< bt_clock
     hid_t events[4];       ///< time, kind, subject, value

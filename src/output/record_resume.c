@@ -32,7 +32,7 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series() : 0, 1, r->merged);
+    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? r->n_series : 0, 1, r->merged);
     bt_impact_store_save(&r->impacts, s);
     return r->h5.status;
 }
@@ -144,7 +144,7 @@ static double missing_value(int k)
 static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
-    for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
+    for (int k = 0; k < r->n_series && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
         const bool maybe = k < bt_n_program_series() || was_zero(bt_series(k));
         if (maybe && !bt_h5_there(old, name))
@@ -260,7 +260,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
     bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
-    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series(), 1, r->merged);
+    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, r->n_series, 1, r->merged);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {

@@ -355,20 +355,20 @@ static void blank(bt_memory *t)
 }
 
 /// Names of the laws that a program has added, in the order of their numbers; "" without any. The caller frees it.
-static char *added_laws(void)
+static char *added_laws(const bt_world *w)
 {
     bt_text t;
     bt_text_begin(&t);
-    for (int k = 0; k < bt_n_contact_laws(); k++) fprintf(t.out, "%s%s", k ? ", " : "", bt_contact_law_of(k)->name);
+    for (int k = 0; k < w->par.added_laws; k++) fprintf(t.out, "%s%s", k ? ", " : "", bt_contact_law_of(k)->name);
     return bt_text_end(&t);
 }
 
 /// Records name their law by its number, and the numbers of added laws follow from the order of their registration.
-static void check_added_laws(bt_snapshot *s)
+static void check_added_laws(const bt_world *w, bt_snapshot *s)
 {
     if (!bt_snapshot_find(s, ADDED_LAWS)) return; // none, or a checkpoint of before they were named
     const char *then = bt_snapshot_text(s, ADDED_LAWS);
-    char *now = added_laws();
+    char *now = added_laws(w);
     if (strcmp(now, then) && s->err)
         bt_errors_add(s->err,
                       "%s: the run had the added contact laws %s, in this order, and this program has %s; go on in one "
@@ -428,7 +428,7 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
         if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&memory[k]);
         save_columns(s, "contacts", memory_columns, N_OF(memory_columns), memory, sizeof *memory, all);
-        char *laws = added_laws();
+        char *laws = added_laws(w);
         if (*laws) bt_snapshot_add_text(s, ADDED_LAWS, laws);
         free(laws);
     }
@@ -546,7 +546,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     w->events.cap = w->events.n;
     int64_t n = -1;
     renew_contacts(s);
-    if (!s->faulty) check_added_laws(s);
+    if (!s->faulty) check_added_laws(w, s);
     if (!s->faulty) load_added_forces(w->forces, s);
     bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
     if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);

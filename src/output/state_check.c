@@ -196,7 +196,7 @@ static void check_contacts(const bt_world *w, const bt_memory *memory, int64_t n
                          "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
         bt_snapshot_want(s, bt_state_finite(t->value, 4), "contacts/value", k, "is not finite");
-        bt_snapshot_want(s, t->law < BT_LAWS + bt_n_contact_laws(), "contacts/law", k, "is no contact law");
+        bt_snapshot_want(s, t->law < BT_LAWS + w->par.added_laws, "contacts/law", k, "is no contact law");
         if (s->faulty) return;
         const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_law_applies(w, t->law, i, j));
         bt_snapshot_want(s, on, "contacts/law", k, "is a contact law that does not apply to the pair");

@@ -61,7 +61,8 @@ static double reduce(const double *x, int64_t first, int64_t end, bt_keep keep)
 static void reduce_added(bt_summary *s, const bt_history *h)
 {
     const int64_t first = s->body ? s->window.first : 0;
-    for (int k = 0; k < bt_n_added(); k++)
+    s->n_added = h->n_columns - BT_N_COLUMNS;
+    for (int k = 0; k < s->n_added; k++)
         s->added[k] = reduce(h->column[BT_N_COLUMNS + k], first, h->n, bt_added(k)->keep);
 }
 
@@ -87,7 +88,7 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
     largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
     s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean;
-    for (int k = 0; k < bt_n_added(); k++) {
+    for (int k = 0; k < s->n_added; k++) {
         if (bt_added(k)->role != BT_ROLE_BALANCE) continue;
         largest = bt_max(largest, fabs(s->added[k]));
         s->balance -= s->added[k];

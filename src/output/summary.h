@@ -20,6 +20,7 @@ typedef struct bt_summary {
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
     /// reductions of the registered quantities over the window, without a towed body over all steps
     double added[BT_MAX_ADDED];
+    int n_added;                      ///< those of the run
     double balance;                   ///< mean tow − drag − Coriolis − tilt − registered forces − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means

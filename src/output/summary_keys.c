@@ -139,7 +139,7 @@ static void write_labels(bt_json *j, const char *key, const view *v, const void 
 static void write_added(bt_json *j, const char *key, const view *v, const void *source)
 {
     (void)key, (void)source;
-    for (int k = 0; k < bt_n_added(); k++) bt_json_number(j, bt_added(k)->summary, v->s->added[k]);
+    for (int k = 0; k < v->s->n_added; k++) bt_json_number(j, bt_added(k)->summary, v->s->added[k]);
 }
 
 static void write_events(bt_json *j, const char *key, const view *v, const void *source)

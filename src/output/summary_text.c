@@ -57,7 +57,7 @@ static void print_mean(const char *label, const bt_mean *m)
 /// Registered quantities: forces among the forces, all others after them.
 static void print_added(const bt_summary *s, bool forces)
 {
-    for (int k = 0; k < bt_n_added(); k++) {
+    for (int k = 0; k < s->n_added; k++) {
         const bt_quantity *q = bt_added(k);
         const bool force = q->role == BT_ROLE_BALANCE || q->role == BT_ROLE_FORCE || q->role == BT_ROLE_LOAD;
         if (force != forces || isnan(s->added[k])) continue;

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from harness import changed, run
-from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, stepped
+from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, python, stepped
 
 pytestmark = pytest.mark.usefixtures("library")
 
@@ -22,6 +22,34 @@ def test_a_force_that_returns_zero_keeps_the_bits(case, tmp_path):
     assert not ours.pop("nothing_force").any()
     for name, values in theirs.items():
         np.testing.assert_array_equal(ours[name], values, name)
+
+
+def beside_a_late_force(case, folder, *, late):
+    """Series and state of a run that a simulation with a new force begins beside."""
+    code = f"""
+import bergtow
+def push(bodies): bodies.force[:] += 1e3, 0
+a = bergtow.Simulation({case!r}, {str(folder)!r}, threads=1)
+a.step(7)
+if {late}:
+    for k in range(12):
+        b = bergtow.Simulation({case!r}, forces={{f"late_{{k}}": push}}, threads=1)
+        b.step(3)
+while a.steps_left: a.step(5)
+a.end()
+"""
+    done = python(code)
+    assert done.returncode == 0, done.stderr
+    return datasets_of(folder / "result.h5"), bergtow.Result(folder).summary["state_hash"]
+
+
+@pytest.mark.parametrize("case", [SHORT, LINE], ids=["speed", "line"])
+def test_a_force_that_comes_later_leaves_a_run_alone(case, tmp_path):
+    alone, state = beside_a_late_force(case, tmp_path / "alone", late=False)
+    beside, same = beside_a_late_force(case, tmp_path / "beside", late=True)
+    assert same == state and beside.keys() == alone.keys()
+    for name, values in alone.items():
+        np.testing.assert_array_equal(beside[name], values, name)
 
 
 class WaterDrag:

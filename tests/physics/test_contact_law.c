@@ -29,6 +29,7 @@ static bt_world *hull_and_floe(double dt, double turn, double speed, double slop
 {
     bt_params p = scene_params(dt, 1);
     p.tilt_ax = slope;
+    p.added_laws = 1;
     p.law_own[BT_LAWS][LOAD] = soft, p.law_own[BT_LAWS][STIFFNESS] = stiff;
     bt_world *w = bt_world_create(&p);
     double v[8];

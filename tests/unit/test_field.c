@@ -12,7 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/contact.h"
 #include "bergtow/field.h"
+#include "bergtow/forces.h"
 #include "bergtow/shape.h"
 #include "field/field_make.h"
 
@@ -553,6 +555,33 @@ static void test_add(void **state)
     bt_field_free(&f);
 }
 
+static void push(const bt_force_body *b, bt_load *l) { l->fx += b->mass; }
+static bool always(const double *own) { return own[0] == 0; }
+static void yield_at_once(const bt_law_contact *t, double load[2], double given[2])
+{
+    (void)t, (void)given;
+    load[0] = load[1] = 1e-3;
+}
+
+/// What a program adds acts on what is towed through the ice, and not on how the ice is made.
+static void test_laws_of_a_program(void **state)
+{
+    (void)state;
+    static const bt_force_law law = {.name = "push", .doc = "a push that never ends", .add = push};
+    static const bt_contact_law contact = {
+        .name = "soft", .doc = "contacts that bear next to nothing", .on = always, .bound = yield_at_once};
+    const bt_case c = basin();
+    bt_errors err = {0};
+    bt_field before = made(&c);
+    assert_int_equal(bt_force_register(&law, &err), BT_OK);
+    assert_int_equal(bt_contact_register(&contact, &err), BT_OK);
+    bt_field after = made(&c);
+    assert_int_equal(after.n, before.n);
+    assert_memory_equal(after.pose, before.pose, 3 * (size_t)before.n * sizeof *before.pose);
+    bt_field_free(&before);
+    bt_field_free(&after);
+}
+
 int main(void)
 {
     omp_set_num_threads(1); // small fields: threads that wait for one another only cost
@@ -562,6 +591,7 @@ int main(void)
         cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
         cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),   cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_laws_of_a_program),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
