@@ -73,9 +73,9 @@ typedef struct bt_ensemble_options {
 typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_member_state;
 
 /// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another
-/// study, a file that it names has changed, the study asks for more ranks than there are), BT_ERR_IO (also: a member is
-/// not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest); the worst status of a failed member
-/// when all others are done.
+/// study, a file that it names has changed, its members would be the same run, the study asks for more ranks than there
+/// are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest);
+/// the worst status of a failed member when all others are done.
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
 
 /// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of

@@ -5,11 +5,13 @@
 #include "field/lead.h"
 #include "bergtow/study.h"
 #include "app/cmd_check.h"
+#include "case/case_derived.h"
 #include "case/cost.h"
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "base/tree.h"
 #include "case/case_base.h"
+#include "run/study_axes.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -28,6 +30,7 @@ typedef struct {
     double floes, steps, seconds, memory, disk; // number, number, s of one core, B, B
     bool step_good;
     int warnings;
+    bool fixed; // the ice does not depend on the seed
 } numbers;
 
 typedef struct {
@@ -121,7 +124,8 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
                        bt_cost_memory(&c, n.count, ranks.size, ranks.size),
                        bt_cost_member(&c, &disk),
                        step.contact && step.floes,
-                       (int)warnings.n};
+                       (int)warnings.n,
+                       !bt_case_ice_is_random(&c)};
         bt_errors_free(&warnings);
     }
     bt_field_free(&f);
@@ -287,8 +291,9 @@ static void print_work(const bt_study *s, double memory, double disk, double sec
 static void print_study(const bt_study *s, const numbers *x, int ranks)
 {
     double seconds = 0, memory = 0, disk = 0;
-    int64_t warned = 0;
+    int64_t warned = 0, fixed = 0;
     for (int64_t k = 0; k < s->n_conditions; k++) {
+        fixed += x[k].fixed && s->repeats > 1;
         seconds += x[k].seconds * (double)s->repeats;
         disk += x[k].disk * (double)s->repeats;
         warned += x[k].warnings > 0;
@@ -308,6 +313,10 @@ static void print_study(const bt_study *s, const numbers *x, int ranks)
            s->common_fields ? ", the same fields in all conditions" : "");
     if (s->ranks > 1) printf(", %" PRId64 " ranks each", s->ranks);
     printf("\n");
+    if (fixed)
+        printf("                     in %" PRId64 " conditions the ice does not depend on the seed, as it is read, or "
+               "there is none: the fields of each are one run\n",
+               fixed);
     if (s->n_conditions <= MOST_ROWS) print_table(s, x);
     else print_range(s, x);
     print_work(s, memory, disk, seconds, ranks);
@@ -320,6 +329,9 @@ bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
     bt_status status = bt_study_read(&s, file->path, err);
     if (status == BT_OK) status = bt_study_override(&s, file->set, file->n_set, err);
     if (status == BT_OK && ranks > 1) status = bt_study_fits(&s, ranks, err);
+    const size_t before = err->n;
+    if (status == BT_OK) bt_study_check_ice(&s, err);
+    if (err->n > before) status = BT_ERR_CASE;
     if (status == BT_OK) {
         numbers *x = bt_alloc((size_t)s.n_conditions, sizeof *x);
         status = check_conditions(&s, x, err);

@@ -48,9 +48,29 @@ static double mean_square_size(const bt_case *c)
     return top / ((bt_pow(lo, -a) - bt_pow(hi, -a)) / a);
 }
 
+bool bt_case_ice_is_random(const bt_case *c)
+{
+    if (c->ice.outlines) return c->ice.thickness_law == BT_THICK_LOGNORMAL && c->ice.thickness_spread > 0;
+    return !c->ice.field && c->ice.concentration > 0;
+}
+
+bool bt_case_key_is_idle(const bt_case *c, const char *key)
+{
+    static const char *const made[] = {"ice.concentration", "ice.shape",       "ice.sides",    "ice.aspect",
+                                       "ice.size",          "ice.size_law",    "ice.size_min", "ice.size_max",
+                                       "ice.size_spread",   "ice.size_exponent", "ice.shake",
+                                       // outlines may lack a thickness, and floes given by hand
+                                       "ice.thickness_law", "ice.thickness_spread", "ice.thickness"};
+    enum { N = sizeof made / sizeof *made };
+    const int n = !bt_case_reads_field(c) ? 0 : c->ice.outlines ? N - 3 : c->n_floes ? N - 1 : N;
+    for (int k = 0; k < n; k++)
+        if (!strcmp(made[k], key)) return true;
+    return false;
+}
+
 double bt_case_expected_floes(const bt_case *c)
 {
-    if (c->ice.field || c->ice.outlines) return 0;
+    if (bt_case_reads_field(c)) return 0;
     double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
     double v[2 * BT_MAX_VERTICES];
     int n = bt_case_waterline(c, v);

@@ -22,6 +22,12 @@ static inline double bt_case_rise(double ice_density, double water_density)
 /// Is the ice read from a file, not made?
 static inline bool bt_case_reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
 
+/// Does the ice depend on ice.seed? What is read does where outlines without a thickness of their own draw one.
+bool bt_case_ice_is_random(const bt_case *c);
+
+/// Is this a key of how ice is made, of no effect on that of this case, which is read?
+bool bt_case_key_is_idle(const bt_case *c, const char *key);
+
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 

@@ -28,7 +28,7 @@ const bt_key bt_study_keys[] = {
         "otherwise"),
     CHOICE("sampling", samplings, "grid", "every combination of the values, or a Latin hypercube"),
     WHOLE("samples", "1", "[1, 100000]", "conditions of the Latin hypercube, which needs it"),
-    WHOLE("repeats", "1", "[1, 100000]", "fields of each condition"),
+    WHOLE("repeats", "1", "[1, 100000]", "fields of each condition; 1 where no ice depends on the seed, as it is read"),
     WHOLE("seed", "1", "[0, 9.2e18]", "from it follow the seeds of the fields, and the Latin hypercube"),
     CHOICE("fields", fields, "own",
            "fields of each condition: its own, or the same in all, to compare conditions on the same ice"),

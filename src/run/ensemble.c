@@ -20,6 +20,7 @@
 #include "run/ensemble_journal.h"
 #include "run/ensemble_member.h"
 #include "run/ensemble_record.h"
+#include "run/study_axes.h"
 #include "run/study_files.h"
 #include "base/fileio.h"
 #include "base/json.h"
@@ -55,6 +56,7 @@ typedef struct {
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
     double most_floes;  ///< of the member with the most
+    int64_t fixed;      ///< conditions whose ice does not depend on the seed
     int n_groups, of_group, threads, jobs, lock; ///< lock: descriptor held for the member at hand
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
@@ -210,6 +212,7 @@ static void make_list(ensemble *e)
             priced = x->m.condition;
             const bool read = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK;
             cost = read ? bt_cost_seconds(&c) : 0;
+            e->fixed += read && !bt_case_ice_is_random(&c);
             if (read) e->most_floes = bt_max(e->most_floes, bt_case_expected_floes(&c) + (double)c.n_floes);
             bt_case_free(&c);
             bt_errors_free(&unheard);
@@ -623,6 +626,25 @@ static void share_cores(ensemble *e, bool open)
     if (open) e->threads = bt_max(1, e->threads / e->jobs);
 }
 
+static bt_status check_ice(const bt_study *s, bt_errors *err)
+{
+    const size_t before = err->n;
+    bt_study_check_ice(s, err);
+    return err->n == before ? BT_OK : BT_ERR_CASE;
+}
+
+static void warn_fixed(const ensemble *e)
+{
+    if (e->fixed == 0 || e->s->repeats == 1) return;
+    bt_errors warnings = {0};
+    bt_errors_add(&warnings,
+                  "warning: in %" PRId64 " of %" PRId64 " conditions the ice does not depend on the seed, as it is "
+                  "read from a file, or there is none: the fields of each are one run",
+                  e->fixed, e->s->n_conditions);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
+}
+
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
 {
     bt_status status = bt_study_fits(s, comm->size, err);
@@ -630,6 +652,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     int threads = 1;
     bool open = false;
     if (status == BT_OK) status = choose_threads(comm, s, o, &threads, &open, err);
+    if (status == BT_OK && comm->rank == 0) status = check_ice(s, err);
     if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
     if (status == BT_OK) status = bt_member_records_begin(&records, s, err);
     status = bt_comm_agree(comm, status);
@@ -668,6 +691,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
                e.n, s->n_conditions, s->repeats, e.before, e.n_groups * e.jobs, s->ranks, e.threads);
         fflush(stdout);
     }
+    if (comm->rank == 0 && !o->job) warn_fixed(&e);
     if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
     struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
     sigemptyset(&act.sa_mask);

@@ -2,8 +2,12 @@
 // What a study gives to some of its members alone; reasons in study_axes.h.
 #include "run/study_axes.h"
 
+#include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "case/case_derived.h"
 
 static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *v, int n, const char *section)
 {
@@ -77,4 +81,57 @@ void bt_study_check_axes(const bt_study *s, bt_errors *err)
     }
     free(sorted);
     free(list);
+}
+
+/// What no condition looked at so far contradicts.
+typedef struct {
+    bt_study_setting *list;
+    bool *idle; ///< [n] the key has no effect
+    int n;
+    bool fixed; ///< the ice does not depend on the seed
+} verdict;
+
+static void look_at_condition(const bt_study *s, int64_t condition, verdict *v)
+{
+    bt_member m;
+    bt_case c;
+    bt_errors unheard = {0};
+    bt_study_member(s, condition * s->repeats, &m);
+    const bool read = bt_member_case(s, &m, &c, &unheard) == BT_OK;
+    v->fixed = v->fixed && read && !bt_case_ice_is_random(&c);
+    for (int i = 0; i < v->n; i++) {
+        char key[96];
+        snprintf(key, sizeof key, "%.*s", v->list[i].length, v->list[i].text);
+        v->idle[i] = v->idle[i] && read && bt_case_key_is_idle(&c, key);
+    }
+    bt_case_free(&c);
+    bt_member_free(&m);
+    bt_errors_free(&unheard);
+}
+
+void bt_study_check_ice(const bt_study *s, bt_errors *err)
+{
+    verdict v = {.fixed = s->repeats > 1};
+    v.list = bt_study_settings(s, &v.n);
+    v.idle = bt_alloc((size_t)v.n + 1, sizeof *v.idle);
+    for (int i = 0; i < v.n; i++) v.idle[i] = true;
+    bool open = true;
+    for (int64_t k = 0; k < s->n_conditions && open; k++) {
+        look_at_condition(s, k, &v);
+        open = v.fixed;
+        for (int i = 0; i < v.n; i++) open = open || v.idle[i];
+    }
+    if (v.fixed)
+        bt_errors_add(err,
+                      "%s: repeats: the ice does not depend on the seed, as it is read from a file, or there is none: "
+                      "the %" PRId64 " fields of a condition would be one run; set repeats: 1, and for other ice vary "
+                      "the place of the body (body.x, body.y), or the file",
+                      s->path, s->repeats);
+    for (int i = 0; i < v.n; i++)
+        if (v.idle[i])
+            bt_errors_add(err, "%s%.*s: has no effect, as all ice is read from files: members that differ by it would "
+                               "be the same run; remove it from `%s`",
+                          v.list[i].at, v.list[i].length, v.list[i].text, v.list[i].section);
+    free(v.idle);
+    free(v.list);
 }

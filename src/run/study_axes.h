@@ -24,4 +24,9 @@ const char *bt_study_varied(const bt_study *s, const char *key);
 /// and record the other.
 void bt_study_check_axes(const bt_study *s, bt_errors *err);
 
+/// Errors for what makes members that are the same run: more than one field where no condition has ice that depends on
+/// the seed, and keys of how ice is made where all conditions read theirs. Reads conditions until one has neither; what
+/// is wrong with a case is not said here.
+void bt_study_check_ice(const bt_study *s, bt_errors *err);
+
 #endif

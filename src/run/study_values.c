@@ -214,6 +214,16 @@ char *bt_study_distribution(const bt_study_parameter *p)
                       p->distribution == BT_NORMAL ? ", 95 % from" : " from", p->from, p->to);
 }
 
+/// An error where values of a range, which ascend, are the same: a grid would have conditions twice.
+static void check_distinct(const bt_study_reader *r, int line, const bt_study_parameter *p)
+{
+    int i = 1;
+    while (i < p->n && strcmp(p->value[i - 1], p->value[i])) i++;
+    if (i < p->n)
+        bt_study_complain(r, line, "%s: %d values from %.6g to %.6g have %s more than once%s; lower n", p->name, p->n,
+                          p->from, p->to, p->value[i], bt_study_is_whole(p) ? ", as they are whole numbers" : "");
+}
+
 void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line, bt_study_parameter *p)
 {
     const bt_key *key = &bt_case_keys[p->key];
@@ -272,11 +282,7 @@ void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line,
     else if (good && in_range_of_key(r, line, p)) {
         p->value = bt_alloc((size_t)n, sizeof *p->value);
         for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
-        int i = 1;
-        while (r->s->sampling == BT_SAMPLING_GRID && i < p->n && strcmp(p->value[i - 1], p->value[i])) i++;
-        if (r->s->sampling == BT_SAMPLING_GRID && i < p->n)
-            bt_study_complain(r, line, "%s: %d values from %.6g to %.6g have %s more than once%s; lower n", p->name, p->n,
-                              p->from, p->to, p->value[i], bt_study_is_whole(p) ? ", as they are whole numbers" : "");
+        if (r->s->sampling == BT_SAMPLING_GRID) check_distinct(r, line, p);
     }
 }
 

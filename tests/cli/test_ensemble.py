@@ -47,6 +47,8 @@ def test_a_row_for_each_member(quiet):
         assert f.attrs["complete"] == 1 and f.attrs["n_members"] == 12 and f.attrs["n_finished"] == 12 and f.attrs[
             "n_failed"] == 0
         assert np.all(f["members/status"][()] == 1) and len(set(f["members/seed"][()])) == 12
+        for number in (f["member"], f["members/id"]):
+            assert number[()].tolist() == list(range(1, 13)) and number.attrs["long_name"].endswith("from 1")
         assert np.array_equal(f["members/condition"][()], np.repeat([0, 1, 2, 3], 3))
         assert np.array_equal(f["parameters/ice.concentration"][()], np.repeat([0.2, 0.5], 6))
         assert np.allclose(f["parameters/tow.speed"][()], np.tile(np.repeat([0.1, 0.2], 3), 2),
