@@ -299,8 +299,8 @@ class Run:
 
     @property
     def legs(self):
-        """(points [K, 2], unit vectors [K, 2]) of the ordered tow: where each leg begins, and its heading; the last goes
-        on without end."""
+        """(points [K, 2], unit vectors [K, 2]) of the ordered tow: where each leg begins, and its heading; the last
+        goes on without end."""
         pairs = re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", self.case.get("tow.waypoints", ""))
         points = np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float)
         if len(points) == 1:

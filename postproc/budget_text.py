@@ -106,8 +106,8 @@ def warnings(found):
         beyond = found.get("left_out")
         out.append(f"{left} of {wanted} members are still to come: this is of the first {found['conditions']} "
                    "conditions, which are a fair sample, and its intervals are wider than those of the whole study."
-                   + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they are "
-                      "depends on how long a tow takes." if beyond else ""))
+                   + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they "
+                      "are depends on how long a tow takes." if beyond else ""))
     if failed := found.get("failed"):
         name, why = next(iter(failed.items()))
         out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). What made them "

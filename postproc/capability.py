@@ -112,8 +112,8 @@ class Search:
         return sets | ({"domain.width": c.wider[value]} if c.wider[value] else {})
 
     def add(self, c, value, n):
-        """n more trials; False where the budget is spent. A run that fails has no outcome: another field is run, and the
-        value is decided where that one could not have changed it."""
+        """n more trials; False where the budget is spent. A run that fails has no outcome: another field is run, and
+        the value is decided where that one could not have changed it."""
         point = c.search.point(value)
         value = point.value
         name, some = self.folder(c, value), c.trials.setdefault(value, [])
@@ -342,7 +342,8 @@ def main(argv=None):
     unit, across = case.get(a.search, "").partition(" ")[2], (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
     found = {
-        "case": a.case.name, "values": {k: v for k, v in case.items() if k not in (a.search, across)}, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
+        "case": a.case.name, "values": {k: v for k, v in case.items() if k not in (a.search, across)},
+        "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
         "range": [start, end], "resolution": resolution, "for": across,
         "for_unit": case.get(across, "").partition(" ")[2],
         "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,

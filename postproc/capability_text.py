@@ -36,8 +36,8 @@ def limits(found, markdown=False):
 
 
 def curve(found, markdown=False):
-    head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted", "speed, m/s (95 %)", "mean tow force",
-            "largest tension: mean", "of all"]
+    head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted",
+            "speed, m/s (95 %)", "mean tow force", "largest tension: mean", "of all"]
     rows = []
     for c in found["conditions"]:
         for p in c["points"]:
@@ -58,8 +58,8 @@ def meaning(found):
     runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
         p["failed"] for c in found["conditions"] for p in c["points"])
     line = ", and no branch of its line parts" if found["breaking_load"] else ""
-    more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that failed "
-            "could have changed it.") if failed else ""
+    more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that "
+            "failed could have changed it.") if failed else ""
     return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
             f"over the window and over its last quarter{line}. Stood still: tows that the ice held for a while. "
             f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "

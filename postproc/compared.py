@@ -106,8 +106,8 @@ def stale(found, e):
 
 
 def misfit(found, texts):
-    """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say of
-    which it is: a key of the ice, the body, the tow, water or air that all members have alike, and it has not."""
+    """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say
+    of which it is: a key of the ice, the body, the tow, water or air that all members have alike, and it has not."""
     for key, value in (found.get("values") or {}).items():
         if not key.startswith(PHYSICAL) or key in PLACES:
             continue

@@ -219,8 +219,8 @@ def statistics(e, options):
         "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
         "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
-        "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS, "conditions": conditions,
-        "sensitivity": sensitivity(e, members), "members": list(members.values()),
+        "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
+        "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
         "convergence": findings.read("converge", e.path)
     }
 

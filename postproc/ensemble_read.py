@@ -125,7 +125,7 @@ class Ensemble:
             for key, data in f["parameters"].items():
                 self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
                 self.units[key] = _text(data.attrs.get("units", "1"))
-            self.state = list(f["members/state_hash"].asstr()[()]) if "members/state_hash" in f else [""] * len(self.name)
+            self.state = list(f["members/state_hash"].asstr()[()])
             self.summary = {key: data[()] for key, data in f["summary"].items()}
             self.meaning = {
                 key: {k: v.decode() if isinstance(v, bytes) else v

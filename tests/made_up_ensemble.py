@@ -125,7 +125,8 @@ def write(folder, members, title="made up", sampling="grid"):
         f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])
-        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", [m["state"] or f"{i}" for i, (m, *_) in enumerate(rows)]),
+        states = [m["state"] or f"{i}" for i, (m, *_) in enumerate(rows)]
+        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", states),
                            ("reason", [m["reason"] for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
         for group in ("parameters", "summary"):

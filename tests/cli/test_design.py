@@ -5,11 +5,13 @@ import shutil
 import subprocess
 import sys
 import zlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 
+import made_up_ensemble as made_up
 from browser import browser, complaints, opened
 from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 
@@ -223,6 +225,18 @@ def test_a_budget_that_does_not_reach(tmp_path, monkeypatch):
     with pytest.raises(RunError, match="do not reach for one field.*raise --budget"):
         design.main([str(tmp_path / "case.yml"), "-o", str(tmp_path / "out"), "--budget", "0.05", "--concentrations",
                      "0.5", "--quiet"])
+
+
+def test_ice_that_is_read_gets_one_field(tmp_path, capsys):
+    """Every other one would be the same run."""
+    made_up.write(tmp_path / "out", [made_up.member(np.ones(9), {}, 0)])
+    studies = []
+    work = SimpleNamespace(program=None, jobs=1, end=np.inf,
+                           ensemble=lambda study: studies.append(yaml.safe_load(study.read_text())) or True)
+    a = design.arguments([str(tmp_path / "case.yml"), "-o", str(tmp_path / "out")])
+    design.run_case(work, a, {name: {} for name in design.SECTIONS} | {"ice": {"outlines": "floes.geojson"}})
+    assert [s["repeats"] for s in studies] == [1] and "parameters" not in studies[0]
+    assert "one field is run" in capsys.readouterr().out
 
 
 def test_the_title_block_of_a_study(tmp_path):

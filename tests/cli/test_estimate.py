@@ -233,6 +233,14 @@ def test_scales_that_are_none_are_refused(tmp_path, scale):
     assert result.returncode == USAGE and "length ratio" in result.stderr and not result.stdout
 
 
+def test_a_file_cannot_be_scaled_and_need_not_be_at_scale_1(tmp_path):
+    (tmp_path / "current.csv").write_text("t,u,v\n0,0,0\n99,0.1,0\n")
+    path = write_case(tmp_path, changed(TOW, water__current_table="current.csv"))
+    assert "current.csv" in twin(tmp_path, path, "1", "same.yml").read_text()
+    result = call("check", path, "--scale", "2")
+    assert result.returncode == CASE and "cannot be scaled with the case" in result.stderr
+
+
 def test_a_twin_out_of_range_is_refused(tmp_path):
     result = call("check", write_case(tmp_path, BERG), "--scale", "10000")
     assert result.returncode == CASE and "domain.length: becomes" in result.stderr and not result.stdout

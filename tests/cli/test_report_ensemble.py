@@ -284,7 +284,8 @@ def test_results_of_another_case_or_of_before_are_doubted(tmp_path):
         return report_ensemble.results_beside(e, [place])[name]["doubt"]
     for name in ("budget", "capability", "converge"):
         assert said(name, values={"ice.size": "30 m"}) == said(name) == ""
-        assert said(name, values={"ice.size": "20 m"}) == "studied for another case: ice.size is 20 m there and 30 m here"
+        assert said(name, values={"ice.size": "20 m"}) == \
+            "studied for another case: ice.size is 20 m there and 30 m here"
     now = report_ensemble.compared.state(e)
     assert said("budget", **now) == ""
     assert said("budget", **now | {"finished": 1}) == \
