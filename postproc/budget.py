@@ -149,7 +149,7 @@ def of_ensemble(e, of=OF[0], computed=None):
     return found | {"title": e.title, "of": of, "units": str(units),
                     "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n,
                     "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows), "failed": failed,
-                    "without_number": lacking, "copies": e.copies, "builds": e.builds}
+                    "without_number": lacking, "copies": e.copies}
 
 
 def of_all(e, some, converge):
@@ -157,7 +157,7 @@ def of_all(e, some, converge):
     texts = compared.cases(e)
     computed = numerics(e, converge, texts)
     first, *more = (of_ensemble(e, of, computed) for of in some)
-    return first | {"more": more, "values": compared.common(texts), **compared.state(e)}
+    return first | {"more": more, "values": compared.common(texts), "builds": e.builds, **compared.state(e)}
 
 
 def read_converge(path, folder):
