@@ -6,7 +6,6 @@ The reader of the files here is Python's own json, and the places on the ellipso
 formulas.
 """
 import json
-import re
 import math
 import re
 
