@@ -141,7 +141,7 @@ class Plane:
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)
         plane.centre = centre or middle(lonlat)
-        if not centre and abs(plane.centre[1]) < 30 and found.crs and crs.is_geographic:
+        if not centre and -53 < plane.centre[1] < 30 and found.crs and crs.is_geographic:
             raise RunError(found.path, "lies about latitude {1:.4g}, longitude {0:.4g}, where no sea ice is".format(
                 *plane.centre), "swap the coordinates if latitude comes first, or give the place with --centre")
         plane._aeqd = about(plane.centre)

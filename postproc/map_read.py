@@ -23,6 +23,7 @@ from bergtow_read import RunError
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
 LOCAL = "urn:x-bergtow:crs:local-metres-east-north"  # src/field/map_crs.h
 MOST_PIXELS = 400_000_000
+NEARLY = ("height", "h", "ice_height", "draft", "dicke", "tykkelse", "sit")  # as src/field/geojson.c
 TELLS_ITSELF = ("TIFFTAG_IMAGEDESCRIPTION", "DESCRIPTION", "Description", "Comment")
 
 try:
@@ -46,6 +47,7 @@ class Reading:
     water: tuple = (0,)     #: values of an image that are no ice
     band: int = None
     pixel: float = None     #: m, of an image that says nothing of its place
+    nodata: str = None      #: "water" or "unseen": what an image's nodata is where --water has its value, too
 
 
 @dataclass
@@ -56,6 +58,7 @@ class Shape:
     geometry: object            #: Polygon, MultiPolygon or None
     thickness: float = None     #: m
     cut: bool = False           #: by the edge of the image
+    pixels: object = None       #: Polygon along the edges of its pixels, whose area an image has
 
 
 @dataclass
@@ -68,6 +71,7 @@ class Map:
     seen: object = None         #: what was imaged, in the coordinates of the file; None: not known
     pixels: int = 0             #: in `seen`
     about: str = ""             #: what the file says of itself
+    near: list = field(default_factory=list)     #: columns not read whose names are nearly that of the thickness
     skipped: dict = field(default_factory=dict)  #: {why: [names]}
 
 
@@ -108,16 +112,18 @@ def refuse_unused(path, how, names, kind):
 
 
 def from_layer(path, source, how):
-    refuse_unused(path, how, ("water", "band", "pixel"), "outlines")
+    refuse_unused(path, how, ("water", "band", "pixel", "nodata"), "outlines")
     names = [source.GetLayer(k).GetName() for k in range(source.GetLayerCount())]
     if how.layer is None and len(names) > 1 or how.layer is not None and how.layer not in names:
         raise RunError(path, f"holds the layers {', '.join(names)}", "choose one of them with --layer")
     layer = source.GetLayerByName(how.layer or names[0])
     columns = [layer.GetLayerDefn().GetFieldDefn(k).GetName() for k in range(layer.GetLayerDefn().GetFieldCount())]
-    column = how.thickness or ("thickness" if "thickness" in columns else None)
+    column = how.thickness or next((name for name in columns if name.lower() == "thickness"), None)
     if column and column not in columns:
         raise RunError(path, f"has no column {column}", f"name one of {', '.join(columns) or 'those of another layer'}")
     found = Map(path, crs_of_layer(path, source, layer), [], about=about_of(path, source, layer))
+    if not column:
+        found.near = [name for name in columns if "thick" in name.lower() or name.lower() in NEARLY]
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
@@ -235,7 +241,7 @@ def lies_on(geometry, axis, value, near):
 
 
 def from_array(path, how):
-    refuse_unused(path, how, ("layer", "where", "band"), "an image")
+    refuse_unused(path, how, ("layer", "where", "band", "nodata"), "an image of numpy")
     try:
         labels = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
@@ -261,8 +267,14 @@ def from_image(path, source, how):
     except RuntimeError as error:
         raise RunError(path, f"cannot be read ({first_line(error)})", "get it anew") from None
     valid = np.isfinite(labels) if labels.dtype.kind == "f" else np.ones(labels.shape, bool)
-    if nodata is not None:
+    if nodata is not None and nodata in how.water and how.nodata is None:
+        raise RunError(path, f"has {nodata:g} both for nodata and for water (--water)",
+                       "say which it is: --nodata water, or --nodata unseen")
+    if nodata is not None and how.nodata != "water":
         valid &= labels != nodata
+    flags = band.GetMaskFlags()
+    if not flags & (gdal.GMF_ALL_VALID | gdal.GMF_NODATA):
+        valid &= band.GetMaskBand().ReadAsArray() != 0
     if source.GetGCPCount() and source.GetGeoTransform(can_return_null=True) is None:
         raise RunError(path, "is placed by control points", "warp it first: gdalwarp -r near")
     reference = source.GetSpatialRef()
@@ -289,7 +301,8 @@ def of_labels(found, labels, valid, place, how):
     touches = prep(edge.boundary).intersects
     for polygon, value in regions(values, valid & ~np.isin(labels, how.water)):
         name = f"label {value} at column {polygon.exterior.coords[0][0]:.0f}, row {polygon.exterior.coords[0][1]:.0f}"
-        found.shapes.append(Shape(name, placed(bevelled(polygon), place), thick.get(value), touches(polygon)))
+        found.shapes.append(Shape(name, placed(bevelled(polygon), place), thick.get(value), touches(polygon),
+                                  placed(Polygon(polygon.exterior), place)))
     if not found.shapes:
         raise RunError(found.path, "holds no label of ice", f"say which values are water: --water (now {how.water})")
     found.seen, found.pixels = placed(edge, place), int(valid.sum())

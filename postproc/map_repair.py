@@ -16,9 +16,13 @@ through the overlap, which changes both, and of three floes depends on the order
 Floes that touch are drawn apart by a gap of GAP: two that share an edge to the last bit, as neighbours of one label
 image do, have no side to which they part, and the reader takes corners of their convex parts for overlaps.
 
+Of a label image the area of a floe is that of its pixels. Simplifying takes the bevelled corners (2.5 % of a square
+of 40 pixels, 15 % of one of 6), so the shore moves out again by as much as keeps the area; where two floes touch, what
+they then share is an overlap as any.
+
 A sliver is what is nowhere as wide as the tolerance: a disc of this diameter fits into it nowhere.
 """
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -97,6 +101,7 @@ class Floe:
     polygon: object
     thickness: float = None
     cut: bool = False
+    pixels: float = None        #: area of its pixels, m², of a label image
 
 
 @dataclass
@@ -158,8 +163,10 @@ def whole(shape, book):
     if len(parts) > 1:
         area = sum(p.area for p in parts)
         book.note("several", shape.name, area, area)
+    pixels = shape.pixels.area if shape.pixels is not None and len(parts) == 1 else None
     names = [shape.name] if len(parts) == 1 else [f"{shape.name}, part {k + 1}" for k in range(len(parts))]
-    return [Floe(name, filled(p, name, book), shape.thickness, shape.cut) for name, p in zip(names, parts)]
+    return [Floe(name, filled(p, name, book), shape.thickness, shape.cut, pixels)
+            for name, p in zip(names, parts)]
 
 
 def ring_area(polygon):
@@ -191,15 +198,27 @@ def chosen(floe, rules, book):
 
 def simplified(floe, rules, book):
     """With fewer vertices: by Douglas & Peucker, no vertex farther from the new outline than the tolerance; more of
-    it where there are too many."""
+    it where there are too many. What this takes from the corners of a label the shore gets back."""
     before, tolerance = floe.polygon, rules.tolerance
-    polygon = before.simplify(tolerance)
+    polygon = with_area(before.simplify(tolerance), floe.pixels)
     if len(polygon.exterior.coords) < len(before.exterior.coords):
-        book.note("simplified", floe.name, before.area, polygon.area)
+        book.note("simplified", floe.name, floe.pixels or before.area, polygon.area)
     if too_many(polygon):
-        first, polygon = polygon.area, fewer(before, tolerance)
+        first, polygon = polygon.area, with_area(fewer(before, tolerance), floe.pixels)
         book.note("vertices", floe.name, first, polygon.area)
-    return opened(Floe(floe.name, polygon, floe.thickness, floe.cut), rules, book)
+    return opened(replace(floe, polygon=polygon), rules, book)
+
+
+def with_area(polygon, area):
+    """The polygon with its edges moved out or in, all by the same, so that it has this area; as it is where that makes
+    more vertices than a floe may have."""
+    new = polygon
+    for _ in range(4 if area else 0):
+        if abs(new.area - area) < 1e-6 * area:  # GEOS takes a step of nothing for one that leaves nothing
+            break
+        parts = parts_of(new.buffer((area - new.area) / new.length, join_style=2, mitre_limit=10))
+        new = Polygon(max(parts, key=lambda p: p.area).exterior) if parts else polygon
+    return polygon if too_many(new) and not too_many(polygon) else new
 
 
 def too_many(polygon):
@@ -231,11 +250,11 @@ def opened(floe, rules, book):
             p.buffer(-wide, **style).buffer(2 * wide, **style).buffer(-wide, **style).simplify(wide / 2))]
     area = sum(p.area for p in parts)
     book.note("narrow", floe.name, polygon.area, area)
-    return [Floe(floe.name, p, floe.thickness, floe.cut) for p in parts]
+    return [replace(floe, polygon=p, pixels=floe.pixels if len(parts) == 1 else None) for p in parts]
 
 
 def large_enough(floe, rules, book):
-    area = floe.polygon.area
+    area = floe.pixels or floe.polygon.area
     if floe.polygon.buffer(-rules.tolerance / 2).is_empty:
         book.note("slivers", floe.name, area)
         return False
@@ -317,7 +336,7 @@ def without(large, small, kind, rules, book):
     knife = small.polygon.buffer(rules.gap + rules.reach, join_style=2)
     parts = [trimmed(p, rules.tolerance) for p in parts_of(large.polygon.difference(knife))]
     book.note(kind, f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
-    out = [Floe(large.name, p, large.thickness, large.cut) for p in parts]
+    out = [replace(large, polygon=p, pixels=None) for p in parts]
     out = [f for piece in out for f in opened(piece, rules, book) if large_enough(f, rules, book)]
     for floe in out:
         if too_many(floe.polygon):
@@ -349,6 +368,13 @@ def trimmed(polygon, tolerance):
         else:
             place += 1
     return Polygon(ring)
+
+
+def hull_of_shapes(shapes):
+    """Polygon around all shapes that have a place in the plane: of outlines nothing else says what was looked at."""
+    from shapely.geometry import MultiPoint
+    places = np.concatenate([vertices(s.geometry) for s in shapes])
+    return MultiPoint(places[np.isfinite(places).all(axis=1)]).convex_hull
 
 
 def hull_of(floes):

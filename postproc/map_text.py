@@ -7,6 +7,8 @@ import numpy as np
 from map_plane import name_of
 from map_repair import KINDS
 
+#: what the concentration refers to
+IMAGED, BOX, HULL = "what was imaged of", "the box of", "the hull of the outlines, within"
 CLASSES = 8     # of the size distribution, each sqrt(2) wide or wider
 
 
@@ -22,6 +24,9 @@ def map_lines(found, crs):
     lines = [f"map: {len(found.shapes)} shapes in {name_of(crs)}"]
     if found.about:
         lines.append(f"the file says of itself: {found.about}")
+    if found.near:
+        lines.append(f"not read as the thickness: {', '.join(found.near)}; name the column with --thickness if it is "
+                     "in metres")
     return lines
 
 
@@ -65,18 +70,19 @@ def change_lines(book):
     return ["changes:", *lines] if lines else ["changes: none"]
 
 
-def numbers(floes, rectangle, imaged):
-    """What the floes are together. rectangle: (x0, x1, y0, y1) along the axes; imaged: its part that was seen, m²."""
+def numbers(floes, rectangle, ground, refers_to, share):
+    """What the floes are together. rectangle: (x0, x1, y0, y1) along the axes; ground: what the concentration refers
+    to, m² and in words; share: of the rectangle that was imaged, or else lies in the hull of the outlines."""
     areas = np.array([f.polygon.area for f in floes])
-    size, within = np.sqrt(4 * areas / np.pi), (rectangle[1] - rectangle[0]) * (rectangle[3] - rectangle[2])
+    size = np.sqrt(4 * areas / np.pi)
     convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)
     thick = np.array([f.thickness for f in floes if f.thickness is not None])
     out = {
         "floes": len(floes), "area_m2": areas.sum(), "mean_size_m": size.mean(), "sizes_m": dict(zip(
             ("least", "q10", "q25", "median", "q75", "q90", "largest"),
             np.quantile(size, (0, .1, .25, .5, .75, .9, 1)))),
-        "size_spread": size.std() / size.mean(), "rectangle_m": list(rectangle), "imaged_share": imaged / within,
-        "concentration": areas.sum() / imaged, "convex": convex, "with_thickness": len(thick),
+        "size_spread": size.std() / size.mean(), "rectangle_m": list(rectangle), "imaged_share": share,
+        "concentration": areas.sum() / ground, "refers_to": refers_to, "convex": convex, "with_thickness": len(thick),
         "mean_thickness_m": thick.mean() if len(thick) else None, "distribution": distribution(size, areas),
     }
     return out
@@ -97,12 +103,15 @@ def floe_lines(numbers):
     lines = [f"floes: {numbers['floes']}, {numbers['convex']} of them convex, {area(numbers['area_m2'])}; mean size "
              f"{length(numbers['mean_size_m'])}, spread {numbers['size_spread']:.2f}, median {length(q['median'])}, "
              f"{length(q['least'])} to {length(q['largest'])}",
-             f"concentration: {numbers['concentration']:.3f} of what was imaged of {length(x1 - x0)} by "
+             f"concentration: {numbers['concentration']:.3f} of {numbers['refers_to']} {length(x1 - x0)} by "
              f"{length(y1 - y0)}"]
     if numbers["imaged_share"] < 0.97:
-        lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the "
-                     "rest for water: choose a smaller one with --box")
-    if numbers["with_thickness"]:
+        seen = "was imaged" if numbers["refers_to"] == IMAGED else "lies in the hull of the outlines"
+        lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle {seen}, and bergtow takes the rest "
+                     "for water: choose a smaller one with --box")
+    if not numbers["with_thickness"]:
+        lines.append("thickness: no floe has one; they get ice.thickness of the case")
+    else:
         lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m in "
                      "the mean")
     lines.append("       size, m          floes   share of the ice")
@@ -110,8 +119,8 @@ def floe_lines(numbers):
                     for row in numbers["distribution"]]
 
 
-def case_lines(path, numbers, heading, margin):
-    """Lines for a case that reads the file: in the geographic frame x is north."""
+def case_lines(path, numbers, heading, margin, latitude=None):
+    """Lines for a case that reads the file: in the geographic frame x is north. latitude: of the centre, deg."""
     x0, x1, y0, y1 = numbers["rectangle_m"]
     low = np.minimum(numbers["reach_m"][:2], (x0, y0)) - margin
     high = np.maximum(numbers["reach_m"][2:], (x1, y1)) + margin
@@ -123,7 +132,8 @@ def case_lines(path, numbers, heading, margin):
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
             f"width: {size[1]:.0f} m}}",
             f"  ice: {{outlines: {path.name}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, "
-            f"y_max: {y1:.1f} m" + (", nonconvex: split}" if bays else "}")]
+            f"y_max: {y1:.1f} m" + (", nonconvex: split}" if bays else "}"),
+            *([] if latitude is None else [f"  water: {{latitude: {latitude:.4g} deg}}"])]
 
 
 def record(found, plane, crs, distortion, bend, book, rules, floes):

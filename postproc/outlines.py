@@ -107,6 +107,8 @@ def arguments(argv):
                    "image the thickness by label: 1=0.5,2=1.2")
     p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that are no ice "
                    "(default 0); each connected region of another one is a floe")
+    p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is, where --water has the "
+                   "same value")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
@@ -150,6 +152,8 @@ def in_plane(found, plane):
         if there.distance(map_repair.Point(0, 0)) < map_plane.FARTHEST:  # others are not for this plane
             bend = max(bend, bent(shape.geometry, plane))
         shape.geometry = there
+        if shape.pixels is not None:
+            shape.pixels = moved(shape.pixels, plane.onto)
     if found.seen is not None:
         found.seen = moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
     return bend
@@ -198,12 +202,17 @@ def summed_up(floes, found, rules):
     half = [v / 2 for v in rules.box] if rules.box else None
     x0, y0, x1, y1 = (-half[0], -half[1], *half) if half else reach
     rectangle = map_read.Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-    imaged = rectangle if found.seen is None else rectangle.intersection(found.seen.buffer(0))
+    hull = found.seen is None  # of outlines nothing else says what was looked at
+    seen = rectangle.intersection(map_repair.hull_of_shapes(found.shapes) if hull else found.seen.buffer(0))
+    boxed = hull and rules.box  # the user says what was mapped
+    ground = rectangle if boxed else seen
     if rules.clear:
-        imaged = imaged.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
-    if not imaged.area > 0:
+        ground = ground.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
+    if not ground.area > 0:
         raise RunError(found.path, "has nothing of the box in its image", "set --centre, or --box")
-    return map_text.numbers(floes, (x0, x1, y0, y1), imaged.area) | {"reach_m": list(reach)}
+    refers_to = map_text.BOX if boxed else map_text.HULL if hull else map_text.IMAGED
+    return map_text.numbers(floes, (x0, x1, y0, y1), ground.area, refers_to,
+                            seen.area / rectangle.area) | {"reach_m": list(reach)}
 
 
 def geojson(floes, found, plane):
@@ -234,7 +243,7 @@ def geojson(floes, found, plane):
 def main(argv=None):
     p, a = arguments(sys.argv[1:] if argv is None else argv)
     check_files(p, a)
-    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata)
     found = map_read.read(a.map, how)
     crs = map_plane.system(found.path, found.crs, a.crs)
     plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
@@ -262,7 +271,8 @@ def main(argv=None):
     print(f"tolerance: {map_text.length(rules.tolerance)}")
     print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
     command.write_text(geojson(floes, found, plane), a.output, a.force)
-    print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN)))
+    print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN,
+                                        None if isinstance(crs, str) else plane.centre[1])))
     print(a.output)
     if a.record:
         record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers)

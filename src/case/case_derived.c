@@ -77,6 +77,12 @@ double bt_case_expected_floes(const bt_case *c)
     bool inside =
         c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
     if (n && inside) area -= bt_shape_moments(n, v).area;
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const bt_floe_def *f = &c->floes[i];
+        if (f->x > c->ice.x_min && f->x < c->ice.x_max && f->y > c->ice.y_min && f->y < c->ice.y_max &&
+            (n = bt_case_floe_outline(f, v)))
+            area -= bt_shape_moments(n, v).area;
+    }
     return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
 }
 

@@ -68,10 +68,10 @@ static bool is_changed(const bt_case *c, const bt_case *defaults, const char *na
 
 bool bt_case_changed(const bt_case *c, const char *key)
 {
-    bt_case defaults;
-    bt_case_defaults(&defaults);
+    bt_case defaults = {0};
+    bt_schema_preset(bt_case_keys, bt_n_case_keys, &defaults);
     const bool changed = is_changed(c, &defaults, key);
-    bt_case_free(&defaults);
+    bt_schema_release(bt_case_keys, bt_n_case_keys, &defaults);
     return changed;
 }
 
@@ -79,9 +79,9 @@ bool bt_case_changed(const bt_case *c, const char *key)
 static void look(const bt_case *c, void (*found)(void *to, const char *key, const idle *r), void *to)
 {
     idle rules[RULES];
-    bt_case defaults;
+    bt_case defaults = {0};
     list(c, rules);
-    bt_case_defaults(&defaults);
+    bt_schema_preset(bt_case_keys, bt_n_case_keys, &defaults);
     defaults.ice.x_min = c->domain.x0, defaults.ice.x_max = c->domain.x0 + c->domain.length;
     defaults.ice.y_min = c->domain.y0, defaults.ice.y_max = c->domain.y0 + c->domain.width;
     for (int i = 0; i < RULES; i++)
@@ -92,7 +92,7 @@ static void look(const bt_case *c, void (*found)(void *to, const char *key, cons
             keys += n;
             if (is_changed(c, &defaults, name)) found(to, name, &rules[i]);
         }
-    bt_case_free(&defaults);
+    bt_schema_release(bt_case_keys, bt_n_case_keys, &defaults);
 }
 
 static void refuse(void *to, const char *key, const idle *r)

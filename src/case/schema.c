@@ -98,8 +98,8 @@ bt_key bt_case_keys[] = {
          "body stands; the default is assumed"),
 
     REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]",
-         "area fraction of ice in the ice region less the body's footprint, 0 = open water; as ice.size and "
-         "ice.thickness, no default in the geographic frame"),
+         "area fraction of ice in the ice region less what the body and floes given by hand cover, 0 = open water; as "
+         "ice.size and ice.thickness, no default in the geographic frame"),
     REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
     REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),

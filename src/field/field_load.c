@@ -64,7 +64,13 @@ static void warn_of_region(const bt_outline_counts *o, bt_errors *warnings)
 static void warn_of_latitude(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
 {
     if (!o->read || !isfinite(o->lat) || c->domain.frame != BT_FRAME_GEOGRAPHIC) return; // a basin lies nowhere
-    const double place = o->lat * 180 / BT_PI, given = c->water.latitude * 180 / BT_PI;
+    const double place = o->lat * 180 / BT_PI, lon = o->lon * 180 / BT_PI;
+    if (isnan(c->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
+        bt_errors_add(warnings,
+                      "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they are to lie in "
+                      "the north, latitude comes first in the file: write [longitude, latitude]",
+                      place, lon);
+    const double given = c->water.latitude * 180 / BT_PI;
     if (given == 0 && fabs(place) > 1)
         bt_errors_add(warnings,
                       "the outlines lie at latitude %.4g deg, and without water.latitude there is no Coriolis force; "

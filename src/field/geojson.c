@@ -193,9 +193,9 @@ static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
     const int a = b.high[2] - b.low[2] < b.high[0] - b.low[0] ? 2 : 0;
     double middle[2] = {(b.low[a] + b.high[a]) / 2, (b.low[1] + b.high[1]) / 2};
     if (!(b.low[0] <= b.high[0])) middle[0] = middle[1] = 0; // no place at all
-    // No sea ice is so far south, and the other way round it could be: the Bohai Sea at 37° has the ice nearest to the
-    // equator.
-    if (!given && fabs(middle[1]) < 30 && fabs(middle[0]) >= 30 && swapped) {
+    // No sea ice is there, and the other way round it could be: nearest to the equator is the ice of the Bohai Sea, at
+    // 37° N, and of South Georgia, at 54° S.
+    if (!given && middle[1] > -53 && middle[1] < 30 && fabs(middle[0]) >= 30 && swapped) {
         bt_refuse(&s->r,
                   "its outlines lie about latitude %.4g, longitude %.4g, where no sea ice is: latitude seems to come "
                   "first; write [longitude, latitude], or give "
@@ -353,6 +353,11 @@ static void read_feature(reader *s, bt_features *features, size_t index, double 
     }
     const json_t *properties = json_object_get(feature, "properties"),
                  *given = json_object_get(properties, "thickness");
+    if (json_is_string(given)) {
+        bt_refuse(&s->r, "%s: thickness is a text, \"%.20s\"; write the number of metres without quotes",
+                  name_of(feature, index, name), json_string_value(given));
+        return;
+    }
     double thickness = bt_field_thickness(s->c, s->f->n);
     if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
     else look_for_thickness(s, properties), counts->bare++;

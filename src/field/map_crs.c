@@ -47,7 +47,7 @@ static const struct {
     {5041, 5042, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, south
     {32661, 32661, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, other order of axes in the registry
     {32761, 32761, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS south
-    {5936, 5940, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // EPSG Alaska, Canada, Greenland, Norway, Russia polar stereographic
+    {5936, 5940, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // EPSG Arctic: Alaska, Canada, Greenland, Norway, Russia
     {3571, 3576, BT_MAP_PLANE, true, 0, 0}, // north pole Lambert azimuthal equal-area, six meridians
     {6931, 6932, BT_MAP_PLANE, true, 0, 0}, // EASE-Grid 2.0 north, south
     {3857, 3857, BT_MAP_WARPED, false, 0, 0}, // Pseudo-Mercator of web maps

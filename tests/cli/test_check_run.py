@@ -53,6 +53,16 @@ def test_keys_that_the_ice_leaves_unused(tmp_path):
     assert again.returncode == DONE and IDLE in again.stdout
 
 
+def test_floes_given_by_hand_take_their_room(tmp_path):
+    """The concentration refers to the region without them, and so does the number of floes that is expected."""
+    slab = {"shape": "rectangle", "length": 6, "width": 7.5, "x": 11, "y": 0}
+    path = write_case(tmp_path, changed(TOW, floes=[slab], ice__size=0.3, ice__size_spread=0.05))
+    made = int(call("field", path, "-o", tmp_path / "f.h5").stdout.split(": ")[1].split()[0])
+    said = json.loads(call("check", path, "--json").stdout)["ice"]
+    about = next(said[k] for k in said if "floes" in k)
+    assert abs(about - 1 - made) < 0.06 * made
+
+
 def both(folder, case):
     path = write_case(folder, case)
     return call("check", path), call("run", path, "-o", folder / "out", "--quiet")

@@ -6,7 +6,6 @@ The reader of the files here is Python's own json, and the places on the ellipso
 formulas.
 """
 import json
-import re
 import math
 import re
 
@@ -465,6 +464,22 @@ def test_the_latitude_of_the_map_and_of_the_case(tmp_path, latitude, says):
     r = call("check", write_case(tmp_path, changed(FRAMES["geographic"], water__latitude=latitude)))
     assert r.returncode == DONE, r.stderr
     assert ("the outlines lie at latitude" in r.stdout) == (says is not None) and (says or "") in r.stdout
+
+
+def test_latitude_first_of_western_places(tmp_path):
+    """Off Newfoundland the swapped place has no ice; off Baffin Island it has, in the south, and that is said."""
+    def swapped(lon, lat):
+        return [p[::-1] for p in lonlat(ARROW, lon, lat)]
+
+    write(tmp_path, swapped(-50, 47))
+    assert "latitude seems to come first" in field(tmp_path, FRAMES["geographic"], code=CASE)
+    write(tmp_path, swapped(-65, 70))
+    said = call("check", write_case(tmp_path, FRAMES["geographic"])).stdout
+    assert "in the south; if they are to lie in the north, latitude comes first" in said
+    for lon, lat in ((120, 40), (-65, 70), (50, 75), (0, -70), (-40, -54)):  # in order
+        write(tmp_path, lonlat(ARROW, lon, lat))
+        r = call("check", write_case(tmp_path, FRAMES["geographic"]))
+        assert r.returncode == DONE and "latitude comes first" not in r.stdout
 
 
 # x = y = 0 on the meridian of a polar map, and the scale there [Snyder 1987, tables 23 and 29, spheres]
