@@ -71,7 +71,8 @@ class Ensemble:
 
         out: the folder, made or gone on with. overrides: {key: value} for all members, values as of a Case. progress:
         print a line for each member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with.
-        Errors: BergtowError with the messages of the program; also where a member has failed, and the others are finished.
+        Errors: BergtowError with the messages of the program; also where a member has failed, and the others are
+        finished.
 
         client: a dask.distributed.Client whose workers see the same folders and the same program; without one it is one
         process for all cores here. tasks: how many calls of the program share the members, of `threads` (1) each;

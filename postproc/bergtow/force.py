@@ -110,11 +110,12 @@ def interrupts_held() -> Iterator[None]:
         yield
         return
     came: list[Any] = []
+    passed_on: Callable[..., Any] = handler
 
     def hold(*what: Any) -> None:
         came.append(what)
         if len(came) > 1 and Forces.calling:
-            handler(*what)
+            passed_on(*what)
 
     signal.signal(signal.SIGINT, hold)
     try:
@@ -122,7 +123,7 @@ def interrupts_held() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, handler)
         if came:
-            handler(*came[0])
+            passed_on(*came[0])
 
 
 class Forces:
