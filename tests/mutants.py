@@ -386,8 +386,8 @@ MUTANTS = {
     "src/step/window.c": (["unit/test_window", "physics/test_window", "physics/test_drag", "parallel/test_window.py",
                            "parallel/test_window.py::test_the_same_bits[speed-1]",
                            "scenes:window,window_backwards", "ranks:window,window_backwards"], [
-        ("sign > 0 ? ceil((v->rear - x) / length) : floor((-x - v->rear) / length)",
-         "sign > 0 ? ceil((v->rear - x) / length) : ceil((-x - v->rear) / length)",
+        ("sign > 0 ? ceil((v->rear - x) / v->length) : floor((-x - v->rear) / v->length)",
+         "sign > 0 ? ceil((v->rear - x) / v->length) : ceil((-x - v->rear) / v->length)",
          "copies of a window that goes backwards"),
         ("late > 0 && floe_at", "floe_at", "floes are renewed before their time"),
         ("if (x >= low + period) x -= period, ++*turns; // rounding", "// rounding", "a place on the rim"),

@@ -14,7 +14,8 @@
 // (bt_on_out_of_memory is called first) and an MPI call that fails (all ranks are ended). After a step that failed, the
 // state is for looking at; end the simulation. With a folder, end and drop then make the state before that step again,
 // from the last checkpoint or the start, and keep it in failure.h5, as the command does; but not where a force was
-// applied, or bodies were changed by hand since that checkpoint, for this cannot be made again.
+// applied, or bodies were changed by hand since that checkpoint, for this cannot be made again. What a step calls
+// (forces, quantities) may look at its simulation; changing or ending it, or stepping any, is refused: BT_ERR_USAGE.
 //
 // Threads. One thread of the program makes all calls, of all simulations; a simulation uses threads of OpenMP within a
 // step. Functions that a program adds to the table of force laws are called by those threads at once; applied forces
@@ -74,7 +75,8 @@ bt_status bt_simulation_step(bt_simulation *s, int64_t n);
 /// a step, and BT_ERR_SIGNAL for a simulation that was asked to stop and whose files are complete.
 bt_status bt_simulation_end(bt_simulation *s);
 
-/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is ignored.
+/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is ignored, and so is a simulation
+/// whose step is under way.
 void bt_simulation_drop(bt_simulation *s);
 
 /// A frame of the bodies as they are now, beside those of output.frame_interval; nothing where this state has one.
@@ -126,8 +128,8 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
 /// that never moves, NaN or infinity.
 bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate);
 
-/// Put a body elsewhere, m, m, rad. Errors: BT_ERR_USAGE as above, for the towed body (its line or course would break),
-/// outside the domain, or where it would overlap another body.
+/// Put a body elsewhere, m, m, rad; its contacts are over. Errors: BT_ERR_USAGE as above, for a body that is towed (its
+/// line or course would break), outside the domain, or where it would overlap another body.
 bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw);
 
 // --- numbers and contacts --------------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ import ctypes
 import ctypes.util
 import functools
 import os
+import threading
+from collections.abc import Callable
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint64, c_void_p
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,32 +56,36 @@ class Applied(ctypes.Structure):
                 ("air", c_double * 2), ("towed", c_int64)]
 
 
+class Status(c_int):
+    """bt_status of a call: what is not OK is raised, with what the library says of it."""
+
+
 APPLIED_FORCE = ctypes.CFUNCTYPE(c_int, POINTER(Applied), c_void_p)
 
 _SIGNATURES = {
     "bt_version": (c_char_p,),
     "bt_last_error": (c_char_p,),
-    "bt_simulation_create": (c_int, POINTER(c_void_p), POINTER(Options)),
-    "bt_simulation_resume": (c_int, POINTER(c_void_p), POINTER(Options)),
-    "bt_simulation_step": (c_int, c_void_p, c_int64),
-    "bt_simulation_end": (c_int, c_void_p),
+    "bt_simulation_create": (Status, POINTER(c_void_p), POINTER(Options)),
+    "bt_simulation_resume": (Status, POINTER(c_void_p), POINTER(Options)),
+    "bt_simulation_step": (Status, c_void_p, c_int64),
+    "bt_simulation_end": (Status, c_void_p),
     "bt_simulation_drop": (None, c_void_p),
     "bt_simulation_steps": (c_int64, c_void_p),
     "bt_simulation_steps_left": (c_int64, c_void_p),
     "bt_simulation_time": (c_double, c_void_p),
     "bt_simulation_dt": (c_double, c_void_p),
     "bt_simulation_hash": (c_uint64, c_void_p),
-    "bt_simulation_checkpoint": (c_int, c_void_p),
-    "bt_simulation_frame": (c_int, c_void_p),
+    "bt_simulation_checkpoint": (Status, c_void_p),
+    "bt_simulation_frame": (Status, c_void_p),
     "bt_simulation_bodies": (c_int64, c_void_p),
     "bt_simulation_towed": (c_int64, c_void_p),
-    "bt_simulation_read": (c_int, c_void_p, c_int, POINTER(c_double)),
+    "bt_simulation_read": (Status, c_void_p, c_int, POINTER(c_double)),
     "bt_simulation_outline": (c_int64, c_void_p, c_int64, POINTER(c_double), c_int64),
-    "bt_simulation_set_velocity": (c_int, c_void_p, c_int64, c_double, c_double, c_double),
-    "bt_simulation_set_place": (c_int, c_void_p, c_int64, c_double, c_double, c_double),
-    "bt_simulation_quantity": (c_int, c_void_p, c_char_p, POINTER(c_double)),
+    "bt_simulation_set_velocity": (Status, c_void_p, c_int64, c_double, c_double, c_double),
+    "bt_simulation_set_place": (Status, c_void_p, c_int64, c_double, c_double, c_double),
+    "bt_simulation_quantity": (Status, c_void_p, c_char_p, POINTER(c_double)),
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
-    "bt_case_check_text": (c_int, POINTER(Options), POINTER(c_void_p)),
+    "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p)),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),
@@ -108,8 +114,61 @@ def library_path() -> str:
     return load()[1]
 
 
+#: The library is for one thread: what another one asks of it waits. A force that calls it back is of the same thread.
+LOCK = threading.RLock()
+
+#: the process whose simulations have started threads of OpenMP, which a fork leaves behind
+team: int | None = None
+
+
+def _after_fork() -> None:
+    global LOCK
+    LOCK = threading.RLock()  # another thread, which is not here, may have had the old one
+
+
+os.register_at_fork(after_in_child=_after_fork)
+
+
+def threads_here(asked: int) -> int:
+    """Threads for a simulation that begins: in a fork of a process that had simulations one alone, for a team of more
+    would wait for those that the fork has left behind."""
+    global team
+    if team in (None, os.getpid()):
+        if asked != 1:
+            team = os.getpid()
+        return asked
+    if asked > 1:
+        raise BergtowError(f"threads: {asked} cannot be had in a fork of a process that has had simulations; take 1, "
+                           'or start processes by multiprocessing.get_context("spawn")')
+    return 1
+
+
+class Library:
+    """The functions of libbergtow, one call at a time."""
+
+    def __init__(self, lib: ctypes.CDLL) -> None:
+        self._lib = lib
+        for name, (result, *arguments) in _SIGNATURES.items():
+            function = getattr(lib, name)
+            function.restype, function.argtypes = c_int if result is Status else result, arguments
+            setattr(self, name, self._locked(function, result is Status))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._lib, name)
+
+    def _locked(self, function: Any, raises: bool) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            with LOCK:
+                answer = function(*arguments)
+                if raises and answer != OK:
+                    text = self._lib.bt_last_error().decode(errors="replace") or f"failed with status {answer}"
+                    raise (CaseError if answer == CASE else BergtowError)(text, answer)
+                return answer
+        return call
+
+
 @functools.cache
-def load() -> tuple[ctypes.CDLL, str]:
+def load() -> tuple[Library, str]:
     """The library with the types of its functions, and its file. Errors: BergtowError, which says what to do."""
     # Threads that spin at a barrier make a busy machine many times slower (src/app/main.c); libgomp reads this when it
     # is loaded, and what the user has set wins.
@@ -125,26 +184,17 @@ def load() -> tuple[ctypes.CDLL, str]:
     else:
         raise BergtowError("libbergtow cannot be loaded (" + "; ".join(reasons) + "); build it with `make lib`, "
                            "install it with `make install`, or name its file in BERGTOW_LIB", IO)
-    for name, (result, *arguments) in _SIGNATURES.items():
-        function = getattr(lib, name)
-        function.restype, function.argtypes = result, arguments
+    library = Library(lib)
     from . import __version__
-    version = lib.bt_version().decode()
+    version = library.bt_version().decode()
     if version != __version__:
         raise BergtowError(f"{path}: is libbergtow {version}, and this package is for {__version__}; "
                            "install both from the same source", IO)
-    return lib, path
+    return library, path
 
 
-def library() -> ctypes.CDLL:
+def library() -> Library:
     return load()[0]
-
-
-def check(status: int) -> None:
-    """Raise what the library says of a call that failed."""
-    if status != OK:
-        text = library().bt_last_error().decode(errors="replace") or f"the library failed with status {status}"
-        raise (CaseError if status == CASE else BergtowError)(text, status)
 
 
 def take_text(address: int | None) -> str:
@@ -153,6 +203,12 @@ def take_text(address: int | None) -> str:
     text = ctypes.string_at(address).decode()
     library().bt_release(address)
     return text
+
+
+def id_of_towed(towed: int | None) -> int:
+    if towed is None:
+        raise BergtowError("there is no towed body in this case; ask has_towed first")
+    return towed
 
 
 def start_mpi() -> None:
@@ -168,6 +224,7 @@ def options(case: Case | None, **more: Any) -> Options:
     if case is None:
         return Options(**(more | texts))
     overrides = [f"{key}={value}".encode() for key, value in case.overrides.items()]
-    return Options(path=os.fsencode(case.path) if case.path is not None else None,
-                   text=case.text.encode() if case.text is not None else None,
+    place = case.place()
+    return Options(path=os.fsencode(place) if place is not None else None,
+                   text=case.text.encode(errors="surrogateescape") if case.text is not None else None,
                    set=(c_char_p * len(overrides))(*overrides), n_set=len(overrides), **(more | texts))

@@ -32,23 +32,60 @@ def quantities() -> dict[str, Any]:
 _SI = {"deg": "rad", "deg/s": "rad/s", "-": ""}
 
 
-def _setting(key: str, value: Any) -> str:
+def setting(key: str, value: Any) -> str:
     """A value for a key as a case file has it: numbers are in SI units here, angles in radians."""
     unit = _keys()[key].get("unit") if key in _keys() else None
     in_radians = unit in ("deg", "deg/s") and not isinstance(value, str)
     return _as_text(value) + (f" {_SI[str(unit)]}" if in_radians else "")
 
 
+def _plain(value: Any) -> Any:
+    """A path or a number of numpy as what it stands for."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{value!r}: is nothing that a case can hold; give a number, a text, a path or a list of them")
+
+
 def _as_text(value: Any) -> str:
+    if value is None:
+        return "none"
     if isinstance(value, str):
         return value
+    if isinstance(value, os.PathLike) or hasattr(value, "tolist"):
+        return _as_text(_plain(value))
     if isinstance(value, bool):
         return "true" if value else "false"
-    if hasattr(value, "tolist"):
-        value = value.tolist()
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_as_text(v) for v in value) + "]"
     return repr(value)
+
+
+def _as_file(sections: Mapping[str, Any]) -> str:
+    """A mapping as the text of a case file. YAML has no pairs of surrogates, and folds or refuses some characters that
+    JSON has as they are."""
+    text = json.dumps(sections, indent=1, ensure_ascii=False, default=_plain)
+    return re.sub("[\x7f-\xa0\u2028\u2029\ufeff\ufffe\uffff]", lambda c: f"\\u{ord(c[0]):04x}", text)
+
+
+def _content(path: str) -> str | None:
+    """The text of a case file; None where it is to be read by the library, which says what is wrong with it."""
+    if not os.path.isfile(path):
+        return None
+    try:
+        with open(path, "rb") as file:
+            data = file.read()
+    except OSError:
+        return None
+    return None if b"\0" in data else data.decode(errors="surrogateescape")
+
+
+def _here() -> str:
+    try:
+        return os.getcwd()
+    except OSError:  # the folder is gone: names that are not absolute lead nowhere
+        return ""
 
 
 def _parsed(text: str, kind: str) -> Any:
@@ -76,17 +113,20 @@ class Case(MutableMapping[str, Any]):
 
     Every value is checked when it is set; one that will not do raises CaseError and changes nothing. Where several
     values only fit together, set them at once: case.update({...}). None stands for a key that has no value. The numbers
-    of a mapping of sections are those of a file: angles in degrees.
+    of a mapping of sections are those of a file: angles in degrees. A file is read once: what becomes of it later does
+    not change the case.
     """
 
     def __init__(self, source: str | os.PathLike[str] | Mapping[str, Any] | None,
                  values: Mapping[str, Any] | None = None, *, text: str | None = None) -> None:
         self.path = None if source is None or isinstance(source, Mapping) else os.fspath(source)
-        self.text = text if text is not None else json.dumps(source, indent=1) if isinstance(source, Mapping) else None
-        if self.path is None and self.text is None:
+        if self.path is None and text is None and not isinstance(source, Mapping):
             raise TypeError("a case needs a file, a mapping or a text")
+        self._folder = _here()
+        self.text = (text if text is not None else _as_file(source) if isinstance(source, Mapping) else
+                     _content(self.path or ""))
         self.overrides: dict[str, str] = {}  #: {key: text} that were set here
-        self._resolve(self.overrides | {k: _setting(k, v) for k, v in (values or {}).items()})
+        self._resolve(self.overrides | {k: setting(k, v) for k, v in (values or {}).items()})
 
     @classmethod
     def from_text(cls, text: str, values: Mapping[str, Any] | None = None,
@@ -98,13 +138,27 @@ class Case(MutableMapping[str, Any]):
         address = ctypes.c_void_p()
         before, self.overrides = self.overrides, overrides
         try:
-            library = _library.library()
-            _library.check(library.bt_case_check_text(ctypes.byref(_library.options(self)), ctypes.byref(address)))
+            _library.library().bt_case_check_text(ctypes.byref(_library.options(self)), ctypes.byref(address))
+            resolved = _library.take_text(address.value)
+            values = self._read(resolved)
         except Exception:
             self.overrides = before
             raise
-        self.resolved = _library.take_text(address.value)  #: every key with its value, as a case file
-        self._values = self._read(self.resolved)
+        self.resolved = resolved  #: every key with its value, as a case file
+        self._values = values
+
+    def place(self) -> str | None:
+        """The path, also from another working folder than that in which the case was made."""
+        return self.path if _here() == self._folder else os.path.join(self._folder, self.path or "case")
+
+    def as_it_was(self) -> Case:
+        """A copy, if the files that the case builds on (`base`) still say what they did; CaseError otherwise."""
+        other = self.copy()
+        other._resolve(other.overrides)
+        if other.resolved != self.resolved:
+            raise CaseError(f"{self.path or 'case'}: a file that it builds on (base) has changed since the case was "
+                            "read; make the Case again", _library.CASE)
+        return other
 
     @staticmethod
     def _read(text: str) -> dict[str, Any]:
@@ -127,11 +181,11 @@ class Case(MutableMapping[str, Any]):
         return self._values.get(key)
 
     def __setitem__(self, key: str, value: Any) -> None:
-        self._resolve(self.overrides | {key: _setting(key, value)})
+        self._resolve(self.overrides | {key: setting(key, value)})
 
     def update(self, values: Any = (), **more: Any) -> None:  # type: ignore[override]
         """Set several values at once, which are checked together."""
-        self._resolve(self.overrides | {k: _setting(k, v) for k, v in dict(values, **more).items()})
+        self._resolve(self.overrides | {k: setting(k, v) for k, v in dict(values, **more).items()})
 
     def __delitem__(self, key: str) -> None:
         """Take back a value that was set: that of the file, or the default, holds again."""

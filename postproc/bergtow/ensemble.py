@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _library
 from ._library import IO, OK, BergtowError
+from .case import setting
 from .engines import on_workers
 from .pictures import Picture, plot_ensemble, report, statistics
 from .results import Result, _imported, _text, _wrapper
@@ -68,9 +69,10 @@ class Ensemble:
             progress: bool = True, client: Any = None, tasks: int = 0) -> Ensemble:
         """Run the members of a study that are open, and return the Ensemble.
 
-        out: the folder, made or gone on with. overrides: {key: value} for all members. progress: print a line for each
-        member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with. Errors: BergtowError
-        with the messages of the program; also where a member has failed, and the others are finished.
+        out: the folder, made or gone on with. overrides: {key: value} for all members, values as of a Case. progress:
+        print a line for each member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with.
+        Errors: BergtowError with the messages of the program; also where a member has failed, and the others are
+        finished.
 
         client: a dask.distributed.Client whose workers see the same folders and the same program; without one it is one
         process for all cores here. tasks: how many calls of the program share the members, of `threads` (1) each;
@@ -78,7 +80,8 @@ class Ensemble:
         last checkpoint: another task goes on with them, or the last call, which is made here.
         """
         command = [program_path(), "ensemble", os.path.abspath(study), "-o", os.path.abspath(out)]
-        command += [word for key, value in (overrides or {}).items() for word in ("--set", f"{key}={value}")]
+        for key, value in (overrides or {}).items():
+            command += ["--set", f"{key}={setting(key, value)}"]
         command += ["--retry-failed"] if retry_failed else []
         if client is not None:
             on_workers(client, [*command, "--threads", str(threads or 1), "--no-wait"], out, tasks, threads, progress)

@@ -2,8 +2,11 @@
 """Forces as Python functions, called once a step with arrays of all bodies (bergtow/applied.h)."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
-from collections.abc import Callable, Mapping
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,8 +29,7 @@ class Bodies:
     """The bodies at the start of a step, as a force sees them; the arrays are valid during the call alone.
 
     id [n]; place [n, 3] x, y, yaw (m, rad); velocity [n, 3] (m/s, rad/s); mass, inertia [n] with those of the water
-    carried along (kg, kg m²); time of the middle of the step, dt (s); water, air: velocities [2] (m/s); towed: row of
-    the towed body, None without.
+    carried along (kg, kg m²); time of the middle of the step, dt (s); water, air: velocities [2] (m/s).
 
     A force adds to `force` [n, 2] (N) and `moment` [n] (N m), which are explicit, or calls drag() or adds to `load`
     [n, 10], the rows of bergtow/applied.h, for what falls with the velocity.
@@ -38,12 +40,53 @@ class Bodies:
         self.id = _view(a.id, n)
         self.place, self.velocity = _view(a.place, n, 3), _view(a.velocity, n, 3)
         self.mass, self.inertia = _view(a.mass, n), _view(a.inertia, n)
-        self.load = _view(a.load, n, _library.LOADS, writeable=True)
-        self.force, self.moment = self.load[:, _FX:_FY + 1], self.load[:, _MOMENT]
+        self._load = _view(a.load, n, _library.LOADS, writeable=True)
         self.time, self.dt = a.time, a.dt
         self.water, self.air = np.array(a.water), np.array(a.air)
         rows = np.flatnonzero(self.id == a.towed)
-        self.towed: int | None = int(rows[0]) if len(rows) else None
+        self.has_towed: bool = len(rows) > 0
+        self._towed = int(rows[0]) if self.has_towed else None
+
+    @property
+    def towed(self) -> int:
+        """Row of the towed body. Where there is none (`has_towed`) it is an error: as None it would mean all bodies
+        where it is an index."""
+        return _library.id_of_towed(self._towed)
+
+    @property
+    def load(self) -> np.ndarray:
+        """[n, 10], the rows of bergtow/applied.h"""
+        return self._load
+
+    @load.setter
+    def load(self, value: npt.ArrayLike) -> None:
+        self._load[:] = value
+
+    @property
+    def force(self) -> np.ndarray:
+        """[n, 2] N"""
+        return self._load[:, _FX:_FY + 1]
+
+    @force.setter
+    def force(self, value: npt.ArrayLike) -> None:
+        self.force[:] = value
+
+    @property
+    def moment(self) -> np.ndarray:
+        """[n] N m"""
+        return self._load[:, _MOMENT]
+
+    @moment.setter
+    def moment(self, value: npt.ArrayLike) -> None:
+        self.moment[:] = value
+
+    def _add(self, answer: npt.ArrayLike) -> None:
+        """What a force returns."""
+        given, n = np.asarray(answer, float), len(self.id)
+        if given.shape not in ((n, 2), (n, 3)):
+            raise ValueError(f"a force returned an array of the shape {given.shape}; with {n} bodies it has to be "
+                             f"({n}, 2), forces, or ({n}, 3), with moments")
+        self._load[:, :given.shape[1]] += given
 
     def drag(self, k: npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """The linear force k (velocity − U), taken at the end of the step, so that no step is too long for it. k: one
@@ -58,6 +101,31 @@ class Bodies:
 Force = Callable[[Bodies], "npt.ArrayLike | None"]
 
 
+@contextlib.contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits for the end of the block, where it would otherwise be raised within the call from C, and lost. A
+    second one is raised in the force that is under way."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    came: list[Any] = []
+    passed_on: Callable[..., Any] = handler
+
+    def hold(*what: Any) -> None:
+        came.append(what)
+        if len(came) > 1 and Forces.calling:
+            passed_on(*what)
+
+    signal.signal(signal.SIGINT, hold)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            passed_on(*came[0])
+
+
 class Forces:
     """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
     in turn with this one, does nothing in the steps of this."""
@@ -65,6 +133,7 @@ class Forces:
     _callbacks: dict[str, Any] = {}  # name -> the C function; kept for ever, as the library keeps its address
     _owner: dict[str, Forces] = {}      # name -> the Forces that have it now
     stepping: Forces | None = None  # whose simulation is in a step
+    calling = False                 # in a function of the user
 
     def __init__(self, functions: Mapping[str, Force] | None) -> None:
         self.functions = dict(functions or {})
@@ -110,14 +179,34 @@ class Forces:
             return 0
         try:
             bodies = Bodies(a.contents)
+            cls.calling = True
             answer = forces.functions[name](bodies)
+            cls.calling = False
             if answer is not None:
-                answer = np.asarray(answer, float)
-                bodies.load[:, :answer.shape[1]] += answer  # [n, 2], or [n, 3] with moments
+                bodies._add(answer)
             return 0
         except BaseException as error:  # goes on when the step has returned
+            cls.calling = False
             forces.raised = error
             return 1
+
+    @contextlib.contextmanager
+    def in_step(self) -> Iterator[None]:
+        """A step of their simulation; what one of them has raised comes out."""
+        if not self.functions:
+            yield
+            return
+        with _library.LOCK, interrupts_held():
+            before, Forces.stepping = Forces.stepping, self
+            try:
+                yield
+            except _library.BergtowError:
+                raised, self.raised = self.raised, None
+                if raised is not None:
+                    raise raised from None
+                raise
+            finally:
+                Forces.stepping = before
 
     def release(self) -> None:
         for name in self.functions:

@@ -2,6 +2,7 @@
 """Simulations that are stepped, and runs from case to result folder."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import html
 import math
@@ -41,7 +42,8 @@ class Simulation:
 
     out: a result folder as `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
     functions of Bodies by the name of their series (NAME_force). The block that is left by an exception writes no
-    summary. Arrays are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the
+    summary, but for one that was asked to stop (the file `stop` in the folder). case: as it was when the simulation
+    began. Arrays are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the
     simulation are sorted by cells and allocated anew within a step, so that a view would come to show other bodies, or
     memory that has been given back; positions of 100,000 bodies take 0.3 ms to copy.
     """
@@ -70,22 +72,24 @@ class Simulation:
                forces: Mapping[str, Force] | None, **more: Any) -> None:
         self._address: c_void_p | None = None
         self._library = _library.library()
+        more["threads"] = _library.threads_here(more["threads"])
+        case = None if case is None else case.as_it_was()
         self._forces = Forces(forces)
         self.folder = None if out is None else os.fspath(out)
         try:
-            if case is not None and forces:
-                case = case.copy()
             address = c_void_p()
             command_line = " ".join(["python", *(os.path.basename(a) for a in sys.argv[:1])])
             o = _library.options(case, dir=self.folder, command_line=command_line, **more)
-            _library.check(getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o)))
+            getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o))
         except BaseException:
             self._forces.release()
             raise
         self._address = address
+        self._process = os.getpid()
         self.case = case if case is not None else Case(os.path.join(self.folder or "", "case.resolved.yml"))
-        #: id of the towed body, None without
-        self.towed: int | None = None if (towed := self._library.bt_simulation_towed(address)) < 0 else towed
+        towed = self._library.bt_simulation_towed(address)
+        self.has_towed: bool = towed >= 0
+        self._towed = towed if self.has_towed else None
         self.n_bodies: int = self._library.bt_simulation_bodies(address)
         self.dt: float = self._library.bt_simulation_dt(address)
 
@@ -93,58 +97,71 @@ class Simulation:
     def _s(self) -> c_void_p:
         if self._address is None:
             raise BergtowError("the simulation has ended")
+        if self._process != os.getpid():
+            raise BergtowError("the simulation is of the process that this one is a fork of; begin one here")
         return self._address
+
+    @property
+    def towed(self) -> int:
+        """Id of the towed body. Where there is none (`has_towed`) it is an error: as None it would mean all bodies
+        where it is an index."""
+        return _library.id_of_towed(self._towed)
 
     # --- steps --------------------------------------------------------------------------------------------------------
 
     def step(self, n: int = 1) -> None:
-        """Make n steps, or as many as are left. An exception of a force comes out of here."""
-        self._forces.raised = None
-        Forces.stepping = self._forces
-        try:
-            status = self._library.bt_simulation_step(self._s, n)
-        finally:
-            Forces.stepping = None
-        if self._forces.raised is not None:
-            raise self._forces.raised
-        _library.check(status)
+        """Make n steps, or as many as are left. An exception of a force comes out of here. Ctrl-C ends it between two
+        steps; a second one ends a force that takes long, and with it the simulation."""
+        while True:
+            with self._forces.in_step():
+                self._library.bt_simulation_step(self._s, min(n, 1))
+            n -= 1
+            if n <= 0 or not self.steps_left:
+                return
 
     def end(self) -> Result | None:
         """Summary and last checkpoint, where there is a folder. Returns its Result, None without."""
-        address, self._address = self._s, None
-        try:
-            _library.check(self._library.bt_simulation_end(address))
-        finally:
-            self._forces.release()
+        self._close("bt_simulation_end")
         return None if self.folder is None else Result(self.folder)
 
     def drop(self) -> None:
         """End without summary."""
         if self._address is not None:
-            address, self._address = self._address, None
-            self._library.bt_simulation_drop(address)
-            self._forces.release()
+            self._close("bt_simulation_drop")
+
+    def _close(self, function: str) -> None:
+        with _library.LOCK:
+            address = self._s
+            if Forces.stepping is self._forces and self._forces.functions:
+                raise BergtowError("a force cannot end the simulation that calls it; end it when the step is done")
+            self._address = None
+            try:
+                getattr(self._library, function)(address)
+            finally:
+                self._forces.release()
 
     def __enter__(self) -> Simulation:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        if kind is not None:
-            self.drop()
-        elif self._address is not None:
+        if self._address is None:
+            return
+        if kind is None or getattr(error, "status", None) == _library.SIGNAL:  # asked to stop: nothing is lost
             self.end()
+        else:
+            self.drop()
 
     def __del__(self) -> None:
-        if getattr(self, "_address", None) is not None:
+        if getattr(self, "_address", None) is not None and self._process == os.getpid():
             self.drop()
 
     def checkpoint(self) -> None:
         """Write a checkpoint into the folder, from which `bergtow resume` goes on."""
-        _library.check(self._library.bt_simulation_checkpoint(self._s))
+        self._library.bt_simulation_checkpoint(self._s)
 
     def frame(self) -> None:
         """Write a frame of the bodies as they are, beside those by output.frame_interval."""
-        _library.check(self._library.bt_simulation_frame(self._s))
+        self._library.bt_simulation_frame(self._s)
 
     @property
     def steps(self) -> int:
@@ -169,7 +186,7 @@ class Simulation:
     def _read(self, name: str) -> np.ndarray:
         kind, width = _KINDS[name]
         out = np.empty((self.n_bodies, width))
-        _library.check(self._library.bt_simulation_read(self._s, kind, _pointer(out)))
+        self._library.bt_simulation_read(self._s, kind, _pointer(out))
         return out[:, 0] if width == 1 else out
 
     @property
@@ -219,6 +236,8 @@ class Simulation:
 
     def outline(self, body: int) -> np.ndarray:
         """[n, 2] m, anticlockwise, where the body is."""
+        if not 0 <= body < self.n_bodies:
+            raise IndexError(f"body {body}: there is none; ids are 0 to {self.n_bodies - 1}")
         n = self._library.bt_simulation_outline(self._s, body, None, 0)
         out = np.empty((n, 2))
         self._library.bt_simulation_outline(self._s, body, _pointer(out), n)
@@ -226,28 +245,31 @@ class Simulation:
 
     def set_velocity(self, body: int, x: float, y: float, rate: float = 0.0) -> None:
         """m/s, m/s, rad/s. Refused for a body whose velocity is prescribed."""
-        _library.check(self._library.bt_simulation_set_velocity(self._s, body, x, y, rate))
+        self._library.bt_simulation_set_velocity(self._s, body, x, y, rate)
 
     def set_position(self, body: int, x: float, y: float, yaw: float) -> None:
         """m, m, rad. Refused outside of the domain, over another body, and for a body that is towed."""
-        _library.check(self._library.bt_simulation_set_place(self._s, body, x, y, yaw))
+        self._library.bt_simulation_set_place(self._s, body, x, y, yaw)
 
     # --- numbers ------------------------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> float:
         """A number of the last step by the name of its series, in SI units; NaN where it does not apply."""
         value = c_double()
-        status = self._library.bt_simulation_quantity(self._s, name.encode(), ctypes.byref(value))
-        if status != _library.OK:
-            raise KeyError(self._library.bt_last_error().decode())
+        address = self._s
+        try:
+            self._library.bt_simulation_quantity(address, name.encode(), ctypes.byref(value))
+        except BergtowError as error:
+            raise KeyError(str(error)) from None
         return value.value
 
     @property
     def contacts(self) -> np.ndarray:
         """Contacts of the last step, an array of the type CONTACT; those without impulse might have come about."""
-        n = self._library.bt_simulation_contacts(self._s, None, 0)
-        rows = np.empty((n, _library.CONTACT_COLUMNS))
-        self._library.bt_simulation_contacts(self._s, _pointer(rows), n)
+        with _library.LOCK:
+            n = self._library.bt_simulation_contacts(self._s, None, 0)
+            rows = np.empty((n, _library.CONTACT_COLUMNS))
+            self._library.bt_simulation_contacts(self._s, _pointer(rows), n)
         out = np.empty(n, CONTACT)
         out["a"], out["b"], out["n_points"] = rows[:, 0], rows[:, 1], rows[:, 2]
         out["point"], out["normal"] = rows[:, 3:7].reshape(n, 2, 2), rows[:, 7:9]
@@ -272,7 +294,8 @@ class Simulation:
 def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.PathLike[str], *,
         forces: Mapping[str, Force] | None = None, threads: int = 0, replace: bool = False,
         progress: bool | Callable[[Simulation], Any] = False) -> Result:
-    """Run a case to its end and return its Result. out: the result folder. It can be interrupted between steps.
+    """Run a case to its end and return its Result. out: the result folder. Ctrl-C ends it between steps as it ends
+    `bergtow run`: with a summary and a checkpoint, from which Simulation.resume goes on.
 
     progress: True for a line that the run renews a few times a second, in notebooks too; or a function, called as
     often with the Simulation.
@@ -280,12 +303,17 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
     with Simulation(case, out, forces=forces, threads=threads, replace=replace) as sim:
         show = _line if progress is True else progress
         last = 0.0
-        while sim.steps_left:
-            sim.step(10)
-            now = time.monotonic()
-            if show and (now - last > 0.25 or not sim.steps_left):
-                last = now
-                show(sim)
+        try:
+            while sim.steps_left:
+                sim.step(10)
+                now = time.monotonic()
+                if show and (now - last > 0.25 or not sim.steps_left):
+                    last = now
+                    show(sim)
+        except KeyboardInterrupt:
+            with contextlib.suppress(BergtowError):  # of a stop, or of a force that Ctrl-C has ended
+                sim.end()
+            raise
         if progress is True:
             print()
         return sim.end() or Result(out)

@@ -193,7 +193,7 @@ bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, ch
 }
 
 // A double-quoted YAML scalar. Control characters, the line separators that YAML folds, and the characters that
-// libyaml refuses to read raw are escaped.
+// libyaml refuses to read raw are escaped, as JSON has it, too.
 static void write_text(const char *text, FILE *out)
 {
     fputc('"', out);
@@ -203,8 +203,8 @@ static void write_text(const char *text, FILE *out)
         if (n > 1) code &= 0x7Fu >> n;
         for (int i = 1; i < n; i++) code = code << 6 | (s[i] & 0x3Fu);
         if (code == '"' || code == '\\') fprintf(out, "\\%c", (int)code);
-        else if (code < 0x20 || (code >= 0x7F && code <= 0xA0)) fprintf(out, "\\x%02X", code);
-        else if (code == 0x2028 || code == 0x2029 || code == 0xFEFF || code == 0xFFFE || code == 0xFFFF)
+        else if (code < 0x20 || (code >= 0x7F && code <= 0xA0) || code == 0x2028 || code == 0x2029 || code == 0xFEFF ||
+                 code == 0xFFFE || code == 0xFFFF)
             fprintf(out, "\\u%04X", code);
         else fwrite(s, 1, (size_t)n, out);
         s += n;

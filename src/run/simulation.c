@@ -24,7 +24,9 @@ struct bt_simulation {
     bt_running r;
     bt_run_manner m;
     bt_status status;         ///< of the last step
+    char *why;                ///< it failed, or NULL
     bool edited;              ///< bodies were changed by hand since the last checkpoint
+    bool *moved;              ///< [bodies] put elsewhere since the last step; NULL = none
     bool alone;               ///< no force was applied in any step
 };
 
@@ -56,6 +58,14 @@ static bt_status refuse(const char *why)
     return reported(BT_ERR_USAGE, &err);
 }
 
+/// Whose step is under way: forces and quantities that it calls may look at it, and must leave it as it is.
+static const bt_simulation *stepping;
+
+static bt_status refuse_within(void)
+{
+    return refuse("a step of the simulation is under way; return from the force or quantity that it has called first");
+}
+
 // --- begin, steps, end -----------------------------------------------------------------------------------------------
 
 static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors *err)
@@ -83,6 +93,8 @@ static void release(bt_simulation *s)
     free(s->dir);
     free(s->from);
     free(s->command_line);
+    free(s->why);
+    free(s->moved);
     free(s);
 }
 
@@ -165,12 +177,22 @@ static bool keeps_failure(const bt_simulation *s)
     return unsound && s->dir && s->alone && !s->edited;
 }
 
+static void forget_moved(bt_simulation *s)
+{
+    free(s->moved);
+    s->moved = NULL;
+}
+
 bt_status bt_simulation_step(bt_simulation *s, int64_t n)
 {
     bt_errors err = {0};
+    if (stepping) return refuse_within(); // of any: applied forces have the bodies of one world at a time
     if (s->status != BT_OK) return refuse("a step has failed before; end the simulation");
     s->alone = s->alone && !bt_force_is_applied();
+    if (n > 0) forget_moved(s);
+    stepping = s;
     for (; n > 0 && s->status == BT_OK && bt_running_goes_on(&s->r); n--) s->status = bt_running_step(&s->r, &err);
+    stepping = NULL;
     if (s->status == BT_OK && bt_halt_stops(s->r.asked)) {
         bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)s->r.w->step);
         s->status = BT_ERR_SIGNAL;
@@ -178,7 +200,9 @@ bt_status bt_simulation_step(bt_simulation *s, int64_t n)
     if (keeps_failure(s))
         bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", s->dir,
                       BT_FAILURE_FILE);
-    return reported(s->status, &err);
+    const bt_status status = reported(s->status, &err);
+    if (status != BT_OK) s->why = bt_text_copy(bt_last_error());
+    return status;
 }
 
 /// Collective. The parts, and the state before a step that was not sound.
@@ -192,10 +216,12 @@ static bt_status close_parts(bt_simulation *s, bt_status status, bt_errors *err)
 
 bt_status bt_simulation_end(bt_simulation *s)
 {
+    if (s == stepping) return refuse_within();
     bt_errors err = {0};
     bt_status status = s->status == BT_ERR_SIGNAL ? BT_OK : s->status;
     if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
     status = close_parts(s, status, &err);
+    if (status != BT_OK && err.n == 0 && s->why) bt_errors_add(&err, "%s", s->why);
     release(s);
     return reported(status, &err);
 }
@@ -203,6 +229,10 @@ bt_status bt_simulation_end(bt_simulation *s)
 void bt_simulation_drop(bt_simulation *s)
 {
     if (!s) return;
+    if (s == stepping) {
+        refuse_within();
+        return;
+    }
     bt_errors err = {0};
     close_parts(s, s->status == BT_OK ? BT_ERR_USAGE : s->status, &err);
     bt_errors_free(&err);
@@ -212,6 +242,7 @@ void bt_simulation_drop(bt_simulation *s)
 bt_status bt_simulation_checkpoint(bt_simulation *s)
 {
     bt_errors err = {0};
+    if (s == stepping) return refuse_within();
     if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
     const bt_status status = bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err);
@@ -222,6 +253,7 @@ bt_status bt_simulation_checkpoint(bt_simulation *s)
 bt_status bt_simulation_frame(bt_simulation *s)
 {
     bt_errors err = {0};
+    if (s == stepping) return refuse_within();
     if (!s->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
     return reported(bt_running_frame(&s->r, &err), &err);
@@ -295,17 +327,28 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
     return n;
 }
 
+/// What a frame or a checkpoint has of this step is no longer the state.
+static bt_status edited(bt_simulation *s, bt_status status, bt_errors *err)
+{
+    if (status == BT_OK) {
+        s->edited = true;
+        s->r.framed = -1;
+    }
+    return reported(status, err);
+}
+
 bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate)
 {
     bt_errors err = {0};
-    s->edited = true;
-    return reported(bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
+    if (s == stepping) return refuse_within();
+    return edited(s, bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
 static bool is_outside(double x, double low, double length) { return x < low || x > low + length; }
 
 bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw)
 {
+    if (s == stepping) return refuse_within();
     bt_errors err = {0};
     const bt_params *p = &s->r.w->par;
     const double length = s->c.domain.length, width = s->c.domain.width;
@@ -314,8 +357,12 @@ bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double
                       y, length, width, p->x0, p->y0);
         return reported(BT_ERR_USAGE, &err);
     }
-    s->edited = true;
-    return reported(bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err), &err);
+    const bt_status status = bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err);
+    if (status == BT_OK) {
+        if (!s->moved) s->moved = bt_alloc((size_t)s->r.w->bodies.n_global, sizeof *s->moved);
+        s->moved[id] = true;
+    }
+    return edited(s, status, &err);
 }
 
 // --- numbers and contacts --------------------------------------------------------------------------------------------
@@ -350,14 +397,24 @@ static void columns_of(const bt_bodies *b, const bt_contact *c, double *out)
            BT_CONTACT_COLUMNS * sizeof *out);
 }
 
+/// Its bodies are where the last step left them: of one that was put elsewhere the contact is over.
+static bool still_there(const bt_simulation *s, const bt_contact *c)
+{
+    const bt_gid *gid = s->r.w->bodies.gid;
+    return !s->moved || !(s->moved[gid[c->a]] || s->moved[gid[c->b]]);
+}
+
 int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room)
 {
     const bt_world *w = s->r.w;
     int64_t n = 0;
     for (bt_idx k = 0; k < w->cells->n; k++) {
         const bt_cell *cell = &w->cells->cell[k];
-        for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++, n++)
+        for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++) {
+            if (!still_there(s, &cell->contacts[j])) continue;
             if (n < room) columns_of(&w->bodies, &cell->contacts[j], out + BT_CONTACT_COLUMNS * n);
+            n++;
+        }
     }
     return n;
 }

@@ -11,6 +11,7 @@
 #include "contact/contacts.h"
 #include "partition/domain.h"
 #include "space/cells.h"
+#include "step/window.h"
 #include "tow/tow.h"
 #include "base/elementary.h"
 
@@ -59,6 +60,18 @@ static void put(bt_bodies *b, bt_idx i, double x, double y, double yaw)
     bt_bodies_turn(b, i);
 }
 
+/// What counts the periods that a body has gone by: it has been put into the window, and elsewhere by as much as it was
+/// moved.
+static void unwrap(bt_world *w, bt_idx i, const bt_pose *was)
+{
+    const bt_pose *p = &w->bodies.pose[i];
+    if (w->window && w->bodies.gid[i] < w->window->n_floes)
+        w->bodies.home[i].lap = bt_window_lap(w->window, p->x);
+    if (!w->tow || i != bt_world_towed(w)) return;
+    w->tow->travel_x += p->x - was->x;
+    w->tow->travel_y += p->y - was->y;
+}
+
 /// Id of a body that body i overlaps by more than is left alone, −1 = none: of those that this rank holds.
 static double obstacle_of(const bt_world *w, bt_idx i)
 {
@@ -98,6 +111,7 @@ bt_status bt_edit_place(bt_world *w, bt_gid gid, const double to[3], bt_errors *
         put(&w->bodies, i, to[0], to[1], to[2]);
         obstacle = obstacle_of(w, i);
         if (obstacle >= 0) put(&w->bodies, i, was.x, was.y, was.yaw);
+        else unwrap(w, i, &was);
     }
     bt_domain_maxima(w, &obstacle, 1);
     if (obstacle >= 0) {

@@ -48,9 +48,14 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
         bt_home *h = &b->home[i];
         *h = (bt_home){.x = x, .y = b->pose[i].y, .yaw = b->pose[i].yaw};
         if (b->gid[i] >= n_floes) continue;
-        // The copy that lies within [rear, rear + L).
-        h->copy = h->lap = (int32_t)(sign > 0 ? ceil((v->rear - x) / length) : floor((-x - v->rear) / length));
+        h->copy = h->lap = bt_window_lap(v, x);
     }
+}
+
+int32_t bt_window_lap(const bt_window *v, double x)
+{
+    // the copy that lies within [rear, rear + L)
+    return (int32_t)(v->sign > 0 ? ceil((v->rear - x) / v->length) : floor((-x - v->rear) / v->length));
 }
 
 static bool renewable(const bt_world *w, bt_idx i)

@@ -56,6 +56,9 @@ void bt_window_begin(bt_world *w);
 /// Low end of the window, x in m.
 static inline double bt_window_low(const bt_window *v) { return v->sign > 0 ? v->rear : -(v->rear + v->length); }
 
+/// Periods that a body in the window at x lies above it.
+int32_t bt_window_lap(const bt_window *v, double x);
+
 /// Windows that have gone by: way of the rear over the length.
 static inline double bt_window_laps(const bt_window *v) { return (v->rear - v->start) / v->length; }
 

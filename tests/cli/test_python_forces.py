@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Forces that are Python functions: as those of the program, and what goes wrong in them."""
 import math
+import os
+import re
+import signal
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -185,6 +189,140 @@ def test_what_goes_wrong_in_a_force_is_reported():
     with bergtow.Simulation(SHORT, forces={"mine": drives}):
         with pytest.raises(bergtow.BergtowError, match="belongs to a simulation that has not ended"):
             bergtow.Simulation(SHORT, forces={"mine": drives})
+
+
+OPEN = changed(SHORT, tow__speed=0.01, run__duration=30)
+
+
+def test_a_force_may_be_set_as_a_whole():
+    def part(bodies):
+        bodies.force[:] = 0.01 * bodies.place[:, :2]
+        bodies.moment[:] = 0.02
+
+    def whole(bodies):
+        bodies.force = 0.01 * bodies.place[:, :2]
+        bodies.moment = np.full(len(bodies.id), 0.02)
+
+    def row(bodies):
+        bodies.load = np.concatenate([0.01 * bodies.place[:, :2], np.full((len(bodies.id), 1), 0.02),
+                                      np.zeros((len(bodies.id), 7))], 1)
+
+    states = [stepped(OPEN, forces={"set": f}) for f in (part, whole, row)]
+    assert set(states) == {states[0]} != {stepped(OPEN)}
+
+
+@pytest.mark.parametrize("columns", [1, 4])
+def test_what_a_force_returns_has_a_shape(columns):
+    def wrong(bodies):
+        return np.zeros((len(bodies.id), columns))
+
+    with pytest.raises(ValueError, match=rf"shape \(\d+, {columns}\).*forces.*moments"):
+        stepped(SHORT, forces={"set": wrong})
+
+
+def test_without_a_towed_body_there_is_no_row_of_it():
+    def hold(bodies):
+        assert not bodies.has_towed
+        bodies.force[bodies.towed] += 1, 0
+
+    case = {k: v for k, v in SHORT.items() if k != "tow"} | {"body": {"shape": "none"}}
+    with bergtow.Simulation(case, threads=1, forces={"hold": hold}) as sim:
+        with pytest.raises(bergtow.BergtowError, match="there is no towed body"):
+            sim.step()
+        assert not sim.has_towed
+        with pytest.raises(bergtow.BergtowError, match="there is no towed body"):
+            sim.positions[sim.towed]
+        sim.drop()
+
+
+def test_a_force_cannot_change_what_steps(tmp_path):
+    said, calls = [], []
+
+    def meddles(bodies):
+        for call in (sim.step, sim.end, sim.drop, sim.checkpoint, sim.frame, other.step,
+                     lambda: sim.set_velocity(0, 1, 0), lambda: sim.set_position(0, 6, 0, 0)):
+            with pytest.raises(bergtow.BergtowError) as refused:
+                call()
+            said.append(str(refused.value))
+        assert len(sim.positions) == len(bodies.id)
+
+    def after(bodies):
+        calls.append(bodies.time)
+
+    with bergtow.Simulation(SHORT) as other, \
+            bergtow.Simulation(SHORT, tmp_path / "out", forces={"meddles": meddles, "afterwards": after}) as sim:
+        sim.step(2)
+        assert len(said) == 16 and {bool(re.search("under way|cannot end", text)) for text in said} == {True}
+        assert sim.steps == len(calls) == 2 and other.steps == 0
+        other.step(2)
+        assert sim.state_hash == other.state_hash
+
+
+def test_ctrl_c_ends_steps_between_two_of_them():
+    def interrupts(bodies):
+        if 0.95 < bodies.time < 1:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with bergtow.Simulation(OPEN, threads=1, forces={"interrupts": interrupts}) as sim:
+        with pytest.raises(KeyboardInterrupt):
+            sim.step(100)
+        assert sim.steps == 10
+        sim.step(2)
+        assert sim.steps == 12 and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_second_ctrl_c_ends_a_force_that_hangs():
+    def hangs(bodies):
+        while True:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        stepped(OPEN, forces={"hangs": hangs})
+
+
+def test_threads_take_turns():
+    def push(bodies):
+        bodies.force[:, 0] += 0.01
+
+    def work(k):
+        with bergtow.Simulation(SHORT, threads=1, forces={f"turn_{k}": push}) as sim:
+            while sim.steps_left:
+                sim.step(5)
+            return sim.state_hash
+
+    def refused(k):
+        with pytest.raises(bergtow.CaseError) as error:
+            bergtow.Case(SHORT, {"tow.speed": f"{k} bananas"})
+        return f"{k} bananas" in str(error.value)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert set(pool.map(work, range(2))) == {work(2)}
+        assert all(pool.map(refused, range(200)))
+
+
+def test_a_fork_is_not_held_up_by_the_threads_of_its_parent():
+    done = python(f"""
+import bergtow, multiprocessing, os
+case = {SHORT!r}
+def work(k):
+    with bergtow.Simulation(case) as sim:
+        sim.step(1000)
+        return sim.state_hash
+def refused(k):
+    try: parent.step(1)
+    except bergtow.BergtowError as error: print(error, flush=True)
+    try: bergtow.Simulation(case, threads=2)
+    except bergtow.BergtowError as error: print(error, flush=True)
+parent = bergtow.Simulation(case, threads=2)
+parent.step(5)
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    states = pool.map_async(work, range(2)).get(60)
+    pool.map_async(refused, range(1)).get(60)
+parent.step(1000)
+assert set(states) == {{parent.state_hash}}
+""", OMP_NUM_THREADS="2")
+    assert done.returncode == 0, done.stderr
+    assert "that this one is a fork of" in done.stdout and "spawn" in done.stdout
 
 
 def test_floes_at_rest_wake_when_a_force_begins():

@@ -68,6 +68,47 @@ def test_a_case_has_the_values_of_the_resolved_one(tmp_path):
     assert "tow.speed" in case._repr_html_()
 
 
+@pytest.mark.parametrize("title", ["a\nb\tc", "floe \U0001f9ca, 50 \xb0", "\x85 \u2028 \ufeff \x7f \\ud83e\\udd8a"])
+def test_a_title_is_any_text(title, tmp_path):
+    case = bergtow.Case(changed(SHORT, run__title=title))
+    assert case["run.title"] == title
+    assert bergtow.Case.from_text(case.resolved)["run.title"] == title
+    path = tmp_path / "case.yml"
+    path.write_text(case.resolved)
+    assert bergtow.Case(path)["run.title"] == title
+
+
+def test_values_of_other_types(tmp_path):
+    assert bergtow.Case(changed(SHORT, ice__seed=np.int64(4), tow__speed=np.float32(0.25)))["ice.seed"] == 4
+    case = bergtow.Case(SHORT)
+    case.update({"guard.escape": np.bool_(False), "tow.speed": np.float64(0.1), "ice.field": None})
+    assert (case["guard.escape"], case["tow.speed"], case["ice.field"]) == (False, 0.1, None)
+    with pytest.raises(bergtow.BergtowError, match="none.h5"):
+        bergtow.Simulation(SHORT | {"ice": {"field": tmp_path / "none.h5"}})
+    with pytest.raises(TypeError, match="is nothing that a case can hold"):
+        bergtow.Case(changed(SHORT, tow__speed=object()))
+    with bergtow.Simulation(SHORT) as sim, pytest.raises(IndexError, match="body -1: there is none"):
+        sim.outline(-1)
+
+
+def test_a_case_is_what_it_was_when_it_was_read(tmp_path, monkeypatch):
+    """Whatever has become of its file, of the working folder, and of the Case once a simulation has begun."""
+    monkeypatch.chdir(tmp_path)
+    write_case(tmp_path, SHORT, "base.yml")
+    (tmp_path / "case.yml").write_text("base: base.yml\ntow: {speed: 0.1}\n")
+    case = bergtow.Case("case.yml")
+    (tmp_path / "case.yml").write_text("base: base.yml\ntow: {speed: 0.2}\n")
+    monkeypatch.chdir("/")
+    with bergtow.Simulation(case) as sim:
+        case["tow.speed"] = 0.3
+        assert sim.case["tow.speed"] == 0.1
+        sim.step(40)
+        assert sim.velocities[sim.towed, 0] == 0.1
+    write_case(tmp_path, changed(SHORT, ice__seed=77), "base.yml")
+    with pytest.raises(bergtow.CaseError, match="case.yml: a file that it builds on .* has changed"):
+        bergtow.Simulation(case)
+
+
 # --- results ---------------------------------------------------------------------------------------------------------
 
 def test_a_result_is_a_dataset(tmp_path):
@@ -125,9 +166,11 @@ def study(folder, **more):
 def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
     """What the program has written, number by number, and the same folder as the command's."""
     path = study(tmp_path)
-    e = bergtow.Ensemble.run(path, tmp_path / "ours", overrides={"ice.friction": 0.1})
+    e = bergtow.Ensemble.run(path, tmp_path / "ours", overrides={"ice.friction": 0.1, "tow.direction": math.pi / 2,
+                                                                 "guard.escape": True})
     assert "4 members finished" in capfd.readouterr().out
-    assert call("ensemble", path, "-o", tmp_path / "theirs", "--set", "ice.friction=0.1").returncode == 0
+    assert call("ensemble", path, "-o", tmp_path / "theirs", "--set", "ice.friction=0.1", "--set",
+                "tow.direction=90 deg").returncode == 0
     assert differing(tmp_path / "ours/ensemble.h5", tmp_path / "theirs/ensemble.h5") == []
     assert e.counts == {"finished": 4, "failed": 0, "waiting": 0} and "4 finished" in repr(e)
     table = e.dataframe
