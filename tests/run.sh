@@ -1,50 +1,75 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Runs the compiled test programs given as arguments, then short runs under the sanitizers, then the Python tests, and
-# ends with one line of counts. A program that crashes or prints no count is itself a failure. A sanitizer that is not
-# installed counts as skipped, and is named.
-passed=0 failed=0 skipped=0
+# Runs the compiled test programs given as arguments and short runs under the sanitizers, as many side by side as there
+# are cores, up to four; then the Python tests in the same way; and ends with one line of counts. A program that crashes
+# or prints no count is itself a failure. A sanitizer that is not installed counts as skipped, and is named.
+#
+# run.sh --one DIR WHAT runs one of them, a program or a sanitizer, and leaves DIR/NAME.log and, with "passed failed
+# skipped", DIR/NAME.count.
+
+one() {
+    name=${2#*/tests/}
+    file=$1/$(echo "$name" | tr / -)
+    start=$(date +%s)
+    p=0 f=0 s=0
+    case $2 in
+    asan | tsan | valgrind)
+        name="short runs under $2"
+        corpus=
+        [ "$2" != asan ] || corpus=build/asan/tests/fuzz/test_corpus
+        tests/sanitize.sh "$2" short $corpus >"$file.log" 2>&1
+        case $? in
+        0) p=1 ;;
+        77) s=1 ;;
+        *) f=1 ;;
+        esac ;;
+    *)
+        "$2" >"$file.log" 2>&1
+        code=$?
+        p=$(sed -n 's/.*PASSED.* \([0-9][0-9]*\) test(s).*/\1/p' "$file.log" | tail -1)
+        f=$(sed -n 's/^ *\([0-9][0-9]*\) FAILED TEST(S).*/\1/p' "$file.log" | tail -1)
+        p=${p:-0} f=${f:-0}
+        if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+        if [ $code -eq 0 ] && [ "$p" -eq 0 ]; then f=1; fi ;;
+    esac
+    # in one write, so that lines of programs side by side stay whole
+    line=$(printf '%-40s %4d passed %4d failed  %3d s' "$name" "$p" "$f" $(($(date +%s) - start)))
+    [ $s -eq 0 ] || line="$line
+    not run: $(tail -1 "$file.log")"
+    [ "$f" -eq 0 ] || line="$line
+$(cat "$file.log")"
+    printf '%s\n' "$line"
+    echo "$p $f $s" >"$file.count"
+}
+if [ "$1" = --one ]; then
+    one "$2" "$3"
+    exit 0
+fi
+
 # On a busy machine threads that spin at a barrier keep the others from the core, and everything stalls; bergtow itself
 # sees to this in main.c.
 export GOMP_SPINCOUNT="${GOMP_SPINCOUNT:-5000}"
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
-
-for t in "$@"; do
-    name=${t#*/tests/}
-    start=$(date +%s)
-    "$t" >"$log" 2>&1
-    code=$?
-    p=$(sed -n 's/.*PASSED.* \([0-9][0-9]*\) test(s).*/\1/p' "$log" | tail -1)
-    f=$(sed -n 's/^ *\([0-9][0-9]*\) FAILED TEST(S).*/\1/p' "$log" | tail -1)
-    p=${p:-0} f=${f:-0}
-    if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
-    if [ $code -eq 0 ] && [ "$p" -eq 0 ]; then f=1; fi
-    passed=$((passed + p)) failed=$((failed + f))
-    printf '%-40s %4d passed %4d failed  %3d s\n' "$name" "$p" "$f" $(($(date +%s) - start))
-    if [ "$f" -ne 0 ]; then cat "$log"; fi
-done
-
-for kind in asan tsan valgrind; do
-    corpus=
-    [ $kind != asan ] || corpus=build/asan/tests/fuzz/test_corpus
-    start=$(date +%s)
-    tests/sanitize.sh $kind short $corpus >"$log" 2>&1
-    code=$?
-    p=0 f=0
-    case $code in
-    0) p=1 ;;
-    77) skipped=$((skipped + 1)) ;;
-    *) f=1 ;;
-    esac
-    passed=$((passed + p)) failed=$((failed + f))
-    printf '%-40s %4d passed %4d failed  %3d s\n' "short runs under $kind" $p $f $(($(date +%s) - start))
-    if [ $code -eq 77 ]; then echo "    not run: $(tail -1 "$log")"; elif [ $code -ne 0 ]; then cat "$log"; fi
-done
-
-# Files of tests side by side, as many as there are cores, up to four.
 workers=$(nproc)
-${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE -n $((workers < 4 ? workers : 4)) --dist loadfile \
+[ "$workers" -le 4 ] || workers=4
+dir=$(mktemp -d)
+trap 'rm -rf "$dir"' EXIT
+
+# Those that take longest go first, so that none of them is left to run alone at the end.
+long='/physics/\(test_tow\|test_motion\|test_resistance\)$'
+{
+    printf '%s\n' "$@" | grep "$long"
+    printf '%s\n' valgrind asan tsan
+    printf '%s\n' "$@" | grep -v "$long"
+} >"$dir/list"
+xargs -n 1 -P "$workers" "$0" --one "$dir" <"$dir/list"
+while read -r what; do
+    count=$dir/$(echo "${what#*/tests/}" | tr / -).count
+    [ -f "$count" ] || echo "0 1 0" >"$count" # one that did not come to its end
+    cat "$count"
+done <"$dir/list" >"$dir/counts"
+
+log=$dir/pytest.log
+${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE -n "$workers" --dist loadfile --durations=25 \
     tests/cli tests/parallel >"$log" 2>&1
 code=$?
 cat "$log"
@@ -54,7 +79,6 @@ e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
 s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
 f=$((${f:-0} + ${e:-0}))
 if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
-passed=$((passed + ${p:-0})) failed=$((failed + f))
+echo "${p:-0} $f ${s:-0}" >>"$dir/counts"
 
-echo "$passed passed, $failed failed, $((skipped + ${s:-0})) skipped"
-[ "$failed" -eq 0 ]
+awk '{ p += $1; f += $2; s += $3 } END { printf "%d passed, %d failed, %d skipped\n", p, f, s; exit f > 0 }' "$dir/counts"
