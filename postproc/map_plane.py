@@ -166,8 +166,10 @@ class Plane:
         return self.lonlat(xy)
 
     def lonlat(self, xy):
-        """Degrees on WGS 84 of coordinates of the map."""
-        return np.array(self._to.transform(*np.asarray(xy).T)).T
+        """Degrees on WGS 84 of coordinates of the map. The 180th meridian has one longitude, so that what a map has cut
+        there has one edge, to the last bit, and is joined again."""
+        lon, lat = np.array(self._to.transform(*np.asarray(xy).T))
+        return np.c_[np.where(lon <= -180, lon + 360, lon), lat]
 
     def onto(self, xy):
         """Metres in the plane of coordinates of the map."""

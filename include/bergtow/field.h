@@ -86,6 +86,9 @@ bool bt_field_outlines_ours(const char *path);
 /// projection leaves uncorrected, a latitude that is not the case's.
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings);
 
+/// Warning of ice that was made: n floes whose mean diameter, m, is not that of the size law.
+void bt_field_size_warn(const bt_case *c, bt_idx n, double mean_size, bt_errors *warnings);
+
 /// Thickness of floe i by the law of the case, m.
 double bt_field_thickness(const bt_case *c, bt_idx i);
 

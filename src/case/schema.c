@@ -113,7 +113,8 @@ bt_key bt_case_keys[] = {
          "geographic frame [Yulmetov & Løset 2017]"),
     CHOICE("ice.size_law", ice.size_law, size_laws, "single", "distribution of the diameter"),
     REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]",
-         "standard deviation / mean of the diameter, laws single and lognormal, assumed"),
+         "standard deviation / mean of the diameter, laws single and lognormal, assumed; above some 0.6 the floes that "
+         "are made have a larger mean and a smaller spread, and a run says so"),
     REAL("ice.size_min", ice.size_min, LENGTH, "0 m", "[0, 1e5]",
          "smallest diameter, needed by law power; 0 = no limit"),
     REAL("ice.size_max", ice.size_max, LENGTH, "0 m", "[0, 1e5]",

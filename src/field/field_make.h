@@ -28,9 +28,9 @@ typedef struct bt_region {
 /// Region, obstacles and ice area of a case. clearance: m. Errors: BT_ERR_CASE.
 bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err);
 void bt_region_free(bt_region *y);
-/// Bring a point into the region along its periodic directions.
 /// Area of a polygon within the region, m², with its images over the edges at which the domain of the case wraps.
 double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const double *v);
+/// Bring a point into the region along its periodic directions.
 void bt_region_wrap(const bt_region *y, double *px, double *py);
 
 /// Size law with its derived constants; diameters are of the circle of equal area, m.

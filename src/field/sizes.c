@@ -13,6 +13,7 @@
 
 #include "base/elementary.h"
 #include "base/rng.h"
+#include "case/case_derived.h"
 
 static double normal_cdf(double x) { return 0.5 * bt_erfc(-x / sqrt(2)); }
 
@@ -109,4 +110,24 @@ double bt_sizes_mean_area(const bt_sizes *s)
     if (s->law == BT_SIZE_POWER) return BT_PI / 4 * power_moment(s, 2);
     if (s->law == BT_SIZE_LOGNORMAL && s->spread > 0) return BT_PI / 4 * lognormal_moment(s, s->mu, 2);
     return BT_PI / 4 * s->mean * s->mean * (1 + s->spread * s->spread);
+}
+
+#define SIZE_OFF 0.05 // of the mean, from which on it is said
+
+void bt_field_size_warn(const bt_case *c, bt_idx n, double mean_size, bt_errors *warnings)
+{
+    bt_sizes s;
+    bt_errors refused = {0}; // such a case makes no ice
+    const bool made = !bt_case_reads_field(c) && c->n_floes == 0 && c->lead.mode == BT_LEAD_NONE && n > 0;
+    if (made && bt_sizes_init(&s, c, &refused) == BT_OK) {
+        const double mean = bt_sizes_mean(&s), second = bt_sizes_mean_area(&s) * 4 / BT_PI;
+        const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = mean_size - mean;
+        if (fabs(off) > SIZE_OFF * mean && fabs(off) > 3 * scatter)
+            bt_errors_add(warnings,
+                          "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
+                          "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
+                          "count on the diameter that was made",
+                          (int)n, mean_size, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+    }
+    bt_errors_free(&refused);
 }

@@ -11,6 +11,7 @@
 #include "output/impact_report.h"
 #include "output/summary.h"
 #include "output/summary_window.h"
+#include "case/case_derived.h"
 
 /// Shares of the wall time, in one line.
 static void print_phases(const bt_phases *p)
@@ -82,8 +83,8 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     printf("  %s\n",
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     print_mean("  ice resistance", &s->ice);
-    printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to "
-           "use\n");
+    printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
+           bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s,", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));

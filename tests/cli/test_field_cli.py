@@ -249,3 +249,17 @@ def test_a_field_for_another_body_is_refused(tmp_path):
     make(tmp_path, BASE)
     moved = run(tmp_path, changed(reading(BASE, "field.h5"), body__x=9), code=CASE)
     assert "overlap" in moved.result.stderr
+
+
+@pytest.mark.parametrize("spread, said", [(0.2, False), (1, True)])
+def test_sizes_that_are_not_those_of_the_law_are_said(tmp_path, spread, said):
+    """At a wide spread small floes are drawn again or find no place; the mean diameter then is another."""
+    case = {"run": {"dt": 1, "duration": 2}, "domain": {"frame": "geographic", "length": 600, "width": 600},
+            "ice": {"concentration": 0.5, "size": 20, "size_spread": spread, "thickness": 1},
+            "body": {"length": 40, "draft": 20}, "tow": {"speed": 0.3}}
+    done = call("field", write_case(tmp_path, case), "-o", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5") as f:
+        mean = np.sqrt(4 * f["floes/area"][:] / np.pi).mean()
+    assert f"mean diameter {mean:.4g} m" in done.stdout
+    assert (abs(mean / 20 - 1) > 0.05) == said == ("that of ice.size_law" in done.stdout), done.stdout
+    assert any("that of ice.size_law" in w for w in run(tmp_path, case).summary["warnings"]) == said
