@@ -27,7 +27,7 @@ import findings
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case
 from case_file import files, section
-from case_runs import SPENT, CaseRuns, above_zero, checked, program
+from case_runs import SPENT, CaseRuns, above_zero, checked, program, whole_from
 
 import numpy as np
 
@@ -289,9 +289,9 @@ def arguments(argv):
     p.add_argument("--speed", metavar="V", help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
     p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
                    "(default 0.5)")
-    p.add_argument("--fields", type=int, choices=range(6, 1001), default=FIELDS, metavar="N",
+    p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
                    help=f"fields of a value, at most (default {FIELDS})")
-    p.add_argument("--points", type=int, choices=range(0, 101), default=POINTS, metavar="N",
+    p.add_argument("--points", type=whole_from(0, 100), default=POINTS, metavar="N",
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
     domain_width.add_option(p)

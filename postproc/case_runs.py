@@ -64,6 +64,8 @@ class CaseRuns:
     made: int = 0          #: runs that were made, and not there before
 
     def __post_init__(self):
+        if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
+            raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out")
         version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
         try:
             layers = files(self.case)
@@ -185,6 +187,15 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
         raise RunError(study, said.removeprefix("bergtow: "), "mend the case or the study")
     sys.stderr.write(done.stderr)
     return done.returncode == 0
+
+
+def whole_from(least, most):
+    """Type of a whole number of an option."""
+    def number(text):
+        if not (text.isdecimal() and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {most}")
+        return int(text)
+    return number
 
 
 def above_zero(text):

@@ -30,7 +30,7 @@ import command
 import findings
 import stat_mean
 from bergtow_read import Run, RunError
-from case_runs import SPENT, CaseRuns, above_zero, program
+from case_runs import SPENT, CaseRuns, above_zero, program, whole_from
 
 import numpy as np
 from scipy import stats
@@ -270,7 +270,7 @@ def main(argv=None):
                    help=f"some of {', '.join(NAMES)} (default: all)")
     p.add_argument("--margin", type=above_zero, default=MARGIN, metavar="M",
                    help="relative effect that does not matter (default 0.1)")
-    p.add_argument("--tries", type=int, choices=range(1, 6), default=TRIES, metavar="K",
+    p.add_argument("--tries", type=whole_from(1, 5), default=TRIES, metavar="K",
                    help="values of a quantity after each other, where the first change matters (default 3)")
     findings.add_options(p, BUDGET)
     a = p.parse_args(argv)

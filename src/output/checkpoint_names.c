@@ -207,7 +207,7 @@ static const row rows[] = {
     {"field/pose", "m, m, rad", "x, y, yaw of each floe at the start", "floe component"},
     {"field/thickness", "m", "thickness of each floe", "floe"},
     {"field/area", "m2", "area of each floe", "floe"},
-    {"field/ice_area", "m2", "area of all floes", "one"},
+    {"field/ice_area", "m2", "area that the concentration of the field refers to", "one"},
     {"field/concentration", "1", "share of the ice region that they cover", "one"},
     {"field/read", "1", "outlines that were read", "one"},
     {"field/turned", "1", "outlines that ran clockwise", "one"},
