@@ -124,6 +124,8 @@ def pages(folder, paths, a):
         if a.also:
             raise RunError(folder, "is a run, and --also is of an ensemble", "leave --also out")
         with Run(folder) as run:
+            if not len(run["time"]):
+                raise RunError(folder, "has made no step to report on", "go on with it: bergtow resume")
             template, context = "run.html", report_run.context(run, 1e6 * a.size, not a.no_compression, given)
     return {path: render(template, context, path.suffix.lower() == ".pdf") for path in paths}
 

@@ -265,6 +265,13 @@ def test_ctrl_c_keeps_what_was_done(tmp_path):
         assert sim.state_hash == stepped(changed(SHORT, run__duration=8))
 
 
+def test_a_run_without_a_step_has_no_report(tmp_path):
+    with bergtow.Simulation(SHORT, tmp_path / "out", threads=1):
+        pass
+    with pytest.raises(bergtow.BergtowError, match="has made no step to report on; go on with it: bergtow resume"):
+        bergtow.report(tmp_path / "out")
+
+
 def test_the_end_after_a_step_that_failed_says_why():
     def fails(bodies):
         raise ValueError("a reason")
