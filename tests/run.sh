@@ -81,4 +81,5 @@ f=$((${f:-0} + ${e:-0}))
 if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
 echo "${p:-0} $f ${s:-0}" >>"$dir/counts"
 
-awk '{ p += $1; f += $2; s += $3 } END { printf "%d passed, %d failed, %d skipped\n", p, f, s; exit f > 0 }' "$dir/counts"
+awk '{ p += $1; f += $2; s += $3 } END { printf "%d passed, %d failed, %d skipped\n", p, f, s; exit f > 0 }' \
+    "$dir/counts"
