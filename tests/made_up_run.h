@@ -50,6 +50,7 @@ static inline bt_case made_up_case(void)
     c.text = text;
     c.run.title = title;
     c.run.dt = 0.1;
+    c.ice.size = 2; // as the totals below have it
     c.tow.mode = BT_TOW_SPEED;
     c.tow.ramp = 0;
     c.domain.width = 100; // 50 body widths: no arches

@@ -262,6 +262,13 @@ void bt_h5_attr_text(bt_h5 *h, const char *object, const char *name, const char 
     H5Tclose(type);
 }
 
+void bt_h5_attr_word(bt_h5 *h, const char *object, const char *name, const char *text)
+{
+    const hid_t type = text_type(strlen(text) + 1);
+    attr(h, object, name, type, text);
+    H5Tclose(type);
+}
+
 void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t value)
 {
     attr(h, object, name, H5T_NATIVE_INT64, &value);

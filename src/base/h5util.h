@@ -49,6 +49,8 @@ void bt_h5_write_text(bt_h5 *h, const char *name, const char *text);            
 void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names);     ///< [n], UTF-8
 /// Attributes of an object ("/" for the root). A second write replaces the first.
 void bt_h5_attr_text(bt_h5 *h, const char *object, const char *name, const char *text);
+/// As long as its text: what a program reads from files that may be damaged.
+void bt_h5_attr_word(bt_h5 *h, const char *object, const char *name, const char *text);
 void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t value);
 void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value);
 

@@ -64,7 +64,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
         bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
         bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
-        bt_h5_attr_text(&h, "/floes", "frame", bt_field_frame(c));
+        bt_h5_attr_word(&h, "/floes", "frame", bt_field_frame(c));
         char *text = bt_case_resolved(c);
         bt_h5_write_text(&h, "/case", text ? text : "");
         bt_h5_describe(&h, "/case", NULL, NULL, "the case with every key, in SI units");
@@ -146,29 +146,18 @@ static double read_number(const reader *r, const char *name)
     return number;
 }
 
-/// The frame that the file names, or "": files of before do not.
+/// The frame that the file names, or "": files of before do not. It is of fixed length: HDF5 1.10 may search for ever for
+/// a text of any length in a file with flipped bits.
 static void read_frame(const reader *r, char frame[16])
 {
     *frame = 0;
     if (r->r.status != BT_OK || H5Aexists_by_name(r->file, "/floes", "frame", H5P_DEFAULT) <= 0) return;
     hid_t a = H5Aopen_by_name(r->file, "/floes", "frame", H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
           space = H5Aget_space(a);
-    if (H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1) {
-        hid_t own = H5Tcopy(H5T_C_S1);
-        char *variable = NULL;
-        if (H5Tis_variable_str(type) > 0) {
-            H5Tset_size(own, H5T_VARIABLE);
-            H5Tset_cset(own, H5Tget_cset(type));
-            if (H5Aread(a, own, &variable) >= 0 && variable) snprintf(frame, 16, "%s", variable);
-            H5free_memory(variable);
-        } else {
-            H5Tset_size(own, 16);
-            H5Tset_cset(own, H5Tget_cset(type));
-            if (H5Aread(a, own, frame) < 0) *frame = 0;
-            frame[15] = 0;
-        }
-        H5Tclose(own);
-    }
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 && H5Tget_size(type) < 16 &&
+        H5Sget_simple_extent_npoints(space) == 1 && H5Aread(a, type, frame) < 0)
+        *frame = 0;
+    frame[15] = 0;
     H5Sclose(space);
     H5Tclose(type);
     H5Aclose(a);
