@@ -31,7 +31,7 @@ typedef struct bt_outline_counts {
     int64_t bare;     ///< features without a thickness, whose floes have that of the case
     int64_t outside;  ///< floes whose centroid is outside the ice region
     double outside_area; ///< area of floes outside the ice region, which the concentration leaves out, m²
-    /// Of a field file: area that its concentration refers to, and that of the case's ice region, m²; others: 0.
+    /// Of a field file: area that its concentration refers to, that of the domain less the body, m²; else 0.
     double own_area, region_area;
 } bt_outline_counts;
 

@@ -138,6 +138,8 @@ bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
 /// case resolved. Two studies with the same text have the same members. Caller frees. NULL with a message when the base
 /// cannot be read.
 char *bt_study_resolved(const bt_study *s, bt_errors *err);
+/// Are two such texts the same but for their comments, the meanings of keys in the words of a version of the program?
+bool bt_study_resolved_alike(const char *a, const char *b);
 
 #ifdef __cplusplus
 }

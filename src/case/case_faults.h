@@ -10,7 +10,8 @@ typedef struct bt_origin {
     int line;        ///< in the file; 0 = default or override
     const char *file; ///< of the files of the case, NULL = its own
     const char *set; ///< the override "key=value", or NULL
-    const char *place; ///< where that stands, "FILE:LINE: ", or NULL: in the command line
+    /// where that stands, "FILE:LINE: ", or NULL: in the command line; "" of a default in a case of a study
+    const char *place;
     bool faulty;     ///< refused; the member holds the default
 } bt_origin;
 

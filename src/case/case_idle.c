@@ -3,7 +3,7 @@
 //
 // Who gives both in one file contradicts himself, and is refused. Where they come from different places, the key may be
 // inherited, from a base or from the case that a study or --set changes: then the run says that it was not used. A
-// default says nothing, nor does a resolved case, which has every key: what it was made from has passed here.
+// default says nothing, nor does a file that has every key, as a resolved case and a scaled twin have: it says what is.
 #include "case/case_idle.h"
 
 #include <math.h>
@@ -95,17 +95,26 @@ static void look(const bt_case *c, void (*found)(void *to, const char *key, cons
     bt_schema_release(bt_case_keys, bt_n_case_keys, &defaults);
 }
 
+/// Does the file in which the key stands have more than half of all keys? Nobody writes so many by hand.
+static bool says_all(const bt_check *k, const char *key)
+{
+    int n = 0;
+    for (int i = 0; i < bt_n_case_keys; i++)
+        n += k->from[i].line > 0 && !strcmp(bt_check_file(k, bt_case_keys[i].name), bt_check_file(k, key));
+    return 2 * n > bt_n_case_keys;
+}
+
 static void refuse(void *to, const char *key, const idle *r)
 {
     const bt_check *k = to;
+    if (says_all(k, key)) return;
     if (!bt_check_sound(k, key) || !bt_check_sound(k, r->cause) || !bt_check_together(k, key, r->cause)) return;
     bt_check_fault(k, key, "has no effect %s; remove the key, or change %s", r->why, r->cause);
 }
 
 void bt_case_check_idle(const bt_check *k)
 {
-    const bool resolved = k->c->text && !strncmp(k->c->text, BT_CASE_RESOLVED_HEAD, strlen(BT_CASE_RESOLVED_HEAD));
-    if (k->from && !resolved) look(k->c, refuse, (void *)k);
+    if (k->from) look(k->c, refuse, (void *)k);
 }
 
 /// Keys of one reason in a row, so that one warning says them.

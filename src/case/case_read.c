@@ -326,6 +326,8 @@ static bt_status read_text(bt_case *c, size_t size, bool alone, const char *cons
     }
     r.path = c->path;
     for (int i = 0; i < n; i++) read_override(&r, overrides[i], place ? place[i] : NULL);
+    for (int k = 0; place && k < bt_n_case_keys; k++) // another member may have another value of what nobody gives here
+        if (!r.given[k] && !r.from[k].set) r.from[k].place = "";
     read_given(&r);
     read_floes(&r);
     size_t in_file = err->n;

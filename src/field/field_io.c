@@ -146,8 +146,8 @@ static double read_number(const reader *r, const char *name)
     return number;
 }
 
-/// The frame that the file names, or "": files of before do not. It is of fixed length: HDF5 1.10 may search for ever for
-/// a text of any length in a file with flipped bits.
+/// The frame that the file names, or "": files of before do not. It is of fixed length: HDF5 1.10 may search for ever
+/// for a text of any length in a file with flipped bits.
 static void read_frame(const reader *r, char frame[16])
 {
     *frame = 0;
@@ -268,7 +268,7 @@ static void take_hulls(bt_field *f)
 {
     bt_field g;
     bt_field_init(&g);
-    double sum = 0;
+    double sum = 0, before = 0;
     for (bt_idx i = 0; i < f->n; i++) {
         const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
@@ -281,11 +281,12 @@ static void take_hulls(bt_field *f)
             memcpy(g.pose + 3 * (size_t)i, p, 3 * sizeof *p);
             g.area[i] = f->area[i];
         }
-        sum += g.area[i];
+        sum += g.area[i], before += f->area[i];
     }
     g.ice_area = f->ice_area;
     memcpy(g.frame, f->frame, sizeof g.frame);
-    g.concentration = sum / g.ice_area;
+    // that of the file may leave out floes beyond its ice region
+    g.concentration = bt_min(f->concentration * (sum / before), bt_max(f->concentration, 1));
     bt_field_free(f);
     *f = g;
 }

@@ -11,13 +11,16 @@
 #include "field/field_make.h"
 #include "field/map_crs.h"
 
-/// The area that the file's concentration refers to, and that of the case's ice region.
+/// The area that the file's concentration refers to, and that of the domain.
 static void note_region(const bt_case *c, bt_field *f)
 {
+    bt_case whole = *c;
+    whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
+    whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
     bt_region y;
     bt_errors unheard = {0}; // no room for ice that is to be made: here it is there
     f->outlines.own_area = f->ice_area;
-    if (bt_region_init(&y, c, 0, &unheard) == BT_OK) f->outlines.region_area = y.ice_area;
+    if (bt_region_init(&y, &whole, 0, &unheard) == BT_OK) f->outlines.region_area = y.ice_area;
     bt_region_free(&y);
     bt_errors_free(&unheard);
 }
@@ -56,8 +59,8 @@ static void warn_of_region(const bt_outline_counts *o, bt_errors *warnings)
                       (long long)o->outside, (long long)o->read, o->outside_area);
     if (o->own_area > 0 && o->region_area > 0 && fabs(o->own_area / o->region_area - 1) > 0.01)
         bt_errors_add(warnings,
-                      "ice.field: the concentration of the file refers to %.6g m2, and the domain less the body has "
-                      "%.6g m2: the floes cover only that part of it, as the file has them",
+                      "ice.field: the concentration of the file refers to an ice region of %.6g m2, and the domain "
+                      "less the body has %.6g m2: it is not that of the domain",
                       o->own_area, o->region_area);
 }
 

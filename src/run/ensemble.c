@@ -237,27 +237,32 @@ static void count_settled(ensemble *e)
     }
 }
 
-/// The folder is of this study, or new; old: which of these. The caller holds its lock.
-static bt_status keep_resolved(const char *dir, const char *text, bool *old, bt_errors *err)
+/// The folder is of this study, or new; old: which of these. digest: of the text that the folder keeps, which may have
+/// the comments of another version of the program. The caller holds its lock.
+static bt_status keep_resolved(const char *dir, const char *text, bool *old, char digest[BT_DIGEST_TEXT],
+                               bt_errors *err)
 {
     char *path = bt_file_join(dir, "study.resolved.yml"), *before = NULL;
     size_t size;
     *old = access(path, F_OK) == 0;
     bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
-    if (status == BT_OK && *old && strcmp(before, text)) {
+    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text)) {
         bt_errors_add(err,
                       "%s: holds the members of another study (see %s): only `repeats` may change; give another "
                       "folder with -o, or restore the study and its base case",
                       dir, path);
         status = BT_ERR_CASE;
     }
+    const char *kept = *old ? before : text;
+    if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
     free(before);
     free(path);
     return status;
 }
 
 /// Folder, resolved study, files that it names; refuses a folder of another study. On rank 0.
-static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o, char digest[BT_DIGEST_TEXT],
+                                bt_errors *err)
 {
     char *text = bt_study_resolved(s, err);
     if (!text) return BT_ERR_CASE;
@@ -269,7 +274,7 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
     bt_status status = bt_file_make_dir(members, err);
     const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
-    if (status == BT_OK) status = keep_resolved(o->dir, text, &old, err);
+    if (status == BT_OK) status = keep_resolved(o->dir, text, &old, digest, err);
     if (status == BT_OK) status = bt_study_files_keep(&files, o->dir, old, &warnings, err);
     if (status == BT_OK) status = bt_file_write(copy, s->text, err);
     if (fd >= 0) close(fd);
@@ -648,18 +653,17 @@ static void warn_fixed(const ensemble *e)
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
 {
     bt_status status = bt_study_fits(s, comm->size, err);
-    bt_member_records records = {0};
+    bt_member_records records;
+    char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;
     if (status == BT_OK) status = choose_threads(comm, s, o, &threads, &open, err);
     if (status == BT_OK && comm->rank == 0) status = check_ice(s, err);
-    if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
-    if (status == BT_OK) status = bt_member_records_begin(&records, s, err);
+    if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, digest, err);
     status = bt_comm_agree(comm, status);
-    if (status != BT_OK) {
-        bt_member_records_end(&records);
-        return status;
-    }
+    if (status != BT_OK) return status;
+    bt_comm_bcast(comm, digest, sizeof digest);
+    bt_member_records_begin(&records, s, digest);
 
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)s->ranks, &group);

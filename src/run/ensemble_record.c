@@ -21,15 +21,11 @@ static const char *const files[] = {"summary.json", "result.h5", "case.resolved.
 enum { N_FILES = sizeof files / sizeof *files, MOST_TEXT = 1024 };
 _Static_assert((int)BT_DIGEST_TEXT == (int)BT_CHECKSUM_DIGEST, "the same digest");
 
-bt_status bt_member_records_begin(bt_member_records *r, const bt_study *s, bt_errors *err)
+void bt_member_records_begin(bt_member_records *r, const bt_study *s, const char study[BT_DIGEST_TEXT])
 {
     *r = (bt_member_records){.n = bt_study_n_members(s)};
-    char *text = bt_study_resolved(s, err);
-    if (!text) return BT_ERR_CASE;
-    bt_checksum_digest_text(text, strlen(text), r->study);
-    free(text);
+    memcpy(r->study, study, sizeof r->study);
     r->seen = bt_alloc((size_t)r->n, sizeof *r->seen);
-    return BT_OK;
 }
 
 void bt_member_records_end(bt_member_records *r)

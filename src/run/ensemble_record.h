@@ -30,8 +30,8 @@ typedef struct bt_member_records {
     uint64_t *seen;
 } bt_member_records;
 
-/// Errors: BT_ERR_CASE, for a study whose base cannot be read.
-bt_status bt_member_records_begin(bt_member_records *r, const bt_study *s, bt_errors *err);
+/// study: digest of DIR/study.resolved.yml.
+void bt_member_records_begin(bt_member_records *r, const bt_study *s, const char study[BT_DIGEST_TEXT]);
 void bt_member_records_end(bt_member_records *r);
 
 /// Write the record of member m, which has just finished in this folder. Errors: BT_ERR_IO, when its files are not what

@@ -100,7 +100,34 @@ bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_e
 
 bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err)
 {
-    return bt_case_read_placed(c, s->base, (const char *const *)s->set, (const char *const *)s->set_at, s->n_set, err);
+    static const char *const none[] = {NULL};
+    return bt_case_read_placed(c, s->base, (const char *const *)s->set,
+                               s->set_at ? (const char *const *)s->set_at : none, s->n_set, err);
+}
+
+/// Length of a line of YAML without its comment.
+static size_t said_in(const char *line)
+{
+    size_t said = 0;
+    bool quoted = false;
+    for (size_t i = 0; line[i] && line[i] != '\n'; i++) {
+        if (quoted && line[i] == '\\' && line[i + 1] && line[i + 1] != '\n') i++;
+        else if (line[i] == '"') quoted = !quoted;
+        else if (!quoted && line[i] == '#' && (i == 0 || line[i - 1] == ' ')) break;
+        if (line[i] != ' ') said = i + 1;
+    }
+    return said;
+}
+
+bool bt_study_resolved_alike(const char *a, const char *b)
+{
+    while (*a || *b) {
+        const size_t n = said_in(a);
+        if (n != said_in(b) || memcmp(a, b, n)) return false;
+        a += strcspn(a, "\n"), b += strcspn(b, "\n");
+        a += *a == '\n', b += *b == '\n';
+    }
+    return true;
 }
 
 char *bt_study_resolved(const bt_study *s, bt_errors *err)

@@ -92,6 +92,7 @@ static said read_said(const bt_key *k, const bt_node *value)
 static bool same(const said *a, const said *b)
 {
     if (a->text && b->text) return !strcmp(a->text, b->text);
+    if (isnan(a->number) || isnan(b->number)) return isnan(a->number) && isnan(b->number); // none
     return fabs(a->number - b->number) <= 1e-12 * fabs(a->number);
 }
 
@@ -110,7 +111,7 @@ void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line,
         if (!bt_study_check_value(r, item->line, p->name, p->key, item)) continue;
         value[p->n] = read_said(&bt_case_keys[p->key], item);
         int twin = 0;
-        while (!same(&value[twin], &value[p->n])) twin++;
+        while (twin < p->n && !same(&value[twin], &value[p->n])) twin++;
         if (twin < p->n && !strcmp(p->value[twin], item->text))
             bt_study_complain(r, item->line, "%s: %s stands twice in the list; remove one", p->name, item->text);
         else if (twin < p->n)

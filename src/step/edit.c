@@ -105,15 +105,16 @@ bt_status bt_edit_place(bt_world *w, bt_gid gid, const double to[3], bt_errors *
         return BT_ERR_USAGE;
     }
     const bt_idx i = bt_world_index(w, gid);
+    bt_pose was = {0};
     double obstacle = -1;
     if (i >= 0) {
-        const bt_pose was = w->bodies.pose[i];
+        was = w->bodies.pose[i];
         put(&w->bodies, i, to[0], to[1], to[2]);
         obstacle = obstacle_of(w, i);
-        if (obstacle >= 0) put(&w->bodies, i, was.x, was.y, was.yaw);
-        else unwrap(w, i, &was);
     }
-    bt_domain_maxima(w, &obstacle, 1);
+    bt_domain_maxima(w, &obstacle, 1); // not every rank that has the body has what it would lie over
+    if (i >= 0 && obstacle >= 0) put(&w->bodies, i, was.x, was.y, was.yaw);
+    else if (i >= 0) unwrap(w, i, &was);
     if (obstacle >= 0) {
         bt_errors_add(err, "body %lld: would lie over body %lld there; choose a free place", id, (long long)obstacle);
         return BT_ERR_USAGE;

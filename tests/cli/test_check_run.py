@@ -53,6 +53,23 @@ def test_keys_that_the_ice_leaves_unused(tmp_path):
     assert again.returncode == DONE and IDLE in again.stdout
 
 
+def test_a_file_that_has_every_key_may_have_those_without_effect(tmp_path):
+    """A resolved case as a base, also without its first line, and a scaled twin say what is, not what is wanted."""
+    case = changed(TOW, ice__size=None, ice__size_law="power", ice__size_min=0.4, ice__size_max=2)
+    twin = call("check", write_case(tmp_path, case), "--scale", "30")
+    (tmp_path / "twin.yml").write_text(twin.stdout)
+    call("run", "case.yml", "-o", "out", "--quiet", "--set", "ice.size_spread=0.3", "--set", "run.duration=1",
+         cwd=tmp_path)
+    text = (tmp_path / "out/case.resolved.yml").read_text()
+    (tmp_path / "copy.yml").write_text(text[text.index("\n") + 1:])
+    write_case(tmp_path, {"base": "out/case.resolved.yml", "run": {"title": "another"}}, "child.yml")
+    for name in "twin.yml", "copy.yml", "child.yml":
+        r = call("check", name, cwd=tmp_path)
+        assert r.returncode == DONE and "no effect with ice.size_law: power" in r.stdout, r.stderr
+    write_case(tmp_path, changed(case, ice__size_spread=0.3), "by_hand.yml")
+    assert "ice.size_spread: has no effect" in call("check", "by_hand.yml", cwd=tmp_path).stderr
+
+
 def test_floes_given_by_hand_take_their_room(tmp_path):
     """The concentration refers to the region without them, and so does the number of floes that is expected."""
     slab = {"shape": "rectangle", "length": 6, "width": 7.5, "x": 11, "y": 0}

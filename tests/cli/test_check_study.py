@@ -239,3 +239,17 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
                          ("ice.seed=4", "take their seeds from `seed`")):
         found = checked(tmp_path, STUDY, CASE, "--set", given)
         assert len(found) == 1 and words in found[0], found
+
+
+def test_none_is_a_value_of_a_list(tmp_path):
+    study = "base: base.yml\nparameters: {body.sail: [none, 0.1 m%s]}\n"
+    assert [row[1] for row in rows(checked(tmp_path, study % ""))[1]] == ["none", "0.1 m"]
+    twice = checked(tmp_path, study % ", none", CASE)
+    assert "none stands twice in the list" in twice[0]
+
+
+def test_a_key_that_another_value_of_an_axis_needs(tmp_path):
+    """The base alone has no use for the limits of the sizes; each condition has."""
+    write_case(tmp_path, changed(BASE, ice__size_min=0.4, ice__size_max=2), "limits.yml")
+    study = {"base": "limits.yml", "parameters": {"ice.size_law": ["lognormal", "power"]}}
+    assert "2 conditions x 1 field" in checked(tmp_path, study)

@@ -109,3 +109,20 @@ def test_a_table_that_changes_while_members_are_run(tmp_path):
     assert refused(tmp_path, "current.csv")
     write(tmp_path, current=0.01)
     assert ensemble(tmp_path).returncode == DONE
+
+
+def test_other_words_for_the_meaning_of_a_key_are_no_other_study(tmp_path):
+    """The comments of study.resolved.yml are the program's own, and another version may say them otherwise: then the
+    folder goes on, and what finished in it stays sound."""
+    prepare(tmp_path, STUDY, changed(TOW, run__duration=4))
+    assert ensemble(tmp_path, "all", "--steps", 5).returncode != CASE
+    kept = tmp_path / "all/study.resolved.yml"
+    text = kept.read_text()
+    assert text.count("  # mean floe thickness") == 1
+    kept.write_text(text.replace("  # mean floe thickness", "  # said otherwise"))
+    assert ensemble(tmp_path).returncode == DONE
+    before = len(journal(tmp_path))
+    result = ensemble(tmp_path)
+    assert result.returncode == DONE and len(journal(tmp_path)) == before, result.stderr
+    kept.write_text(text.replace("concentration: ", "concentration: 0.0", 1))
+    assert "another study" in ensemble(tmp_path).stderr

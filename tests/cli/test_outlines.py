@@ -416,6 +416,23 @@ def test_the_concentration_is_that_of_the_ice_region(tmp_path):
     assert any("refers to 96.8" in w and "the domain less the body has 196.8" in w for w in warned)
 
 
+def test_more_ice_outside_the_region_than_would_fit_into_it(tmp_path):
+    """The run is resumed, and a field file of it is read, with bays or their hulls."""
+    write(tmp_path, feature(at(C_SHAPE, 5, 2)), *(feature(at(SQUARE, 8 + 1.5 * (k % 7), -4.8 + 1.2 * (k // 7)))
+                                                  for k in range(35)))
+    case = changed(BASE, ice__x_min=4, ice__x_max=7.5, ice__nonconvex="split")
+    concentration = warnings_of(tmp_path, case)[1]
+    assert concentration == pytest.approx(2.5 / 35, rel=1e-9)
+    done = call("run", write_case(tmp_path, case), "-o", tmp_path / "out", "--steps", 3, "--quiet")
+    assert done.returncode == DONE, done.stderr
+    done = call("resume", tmp_path / "out", "--quiet")
+    assert done.returncode == DONE, done.stderr
+    field(tmp_path, case)
+    for way, share in ("split", 1), ("hull", 39 / 37.5):
+        again = changed(BASE, ice={"field": "out.h5", "nonconvex": way})
+        assert warnings_of(tmp_path, again)[1] == pytest.approx(concentration * share, rel=1e-9)
+
+
 def test_over_a_periodic_edge_a_floe_counts_whole(tmp_path):
     write(tmp_path, feature(at(SQUARE, 19.25, 0)), feature(at(SQUARE, 8, 0)))
     case = changed(BASE, domain__ends="periodic")
