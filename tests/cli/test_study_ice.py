@@ -5,7 +5,7 @@ import json
 import h5py
 import pytest
 
-from harness import CASE, DONE, TOW, call, changed
+from harness import CASE, DONE, TOW, call, changed, reading
 from test_ensemble import ensemble, prepare
 
 STUDY = {"base": "base.yml"}
@@ -28,9 +28,10 @@ def folder(tmp_path):
     return tmp_path
 
 
+OUTLINES = changed(LOOSE, ice__outlines_crs="frame", ice__concentration=None, ice__size=None)
 READ = {
-    "outlines": changed(LOOSE, ice__outlines="own.json", ice__outlines_crs="frame"),
-    "field": changed(LOOSE, ice__field="field.h5"),
+    "outlines": changed(OUTLINES, ice__outlines="own.json"),
+    "field": reading(LOOSE, "field.h5"),
     "open water": changed(LOOSE, ice__concentration=0),
 }
 
@@ -60,7 +61,7 @@ def test_fields_of_ice_that_does_not_depend_on_the_seed_are_refused(folder, kind
 
 
 def test_outlines_that_draw_their_thickness_are_other_ice_with_every_seed(folder):
-    base = changed(LOOSE, ice__outlines="open.json", ice__outlines_crs="frame", ice__thickness_law="lognormal")
+    base = changed(OUTLINES, ice__outlines="open.json", ice__thickness_law="lognormal")
     prepare(folder, STUDY | {"repeats": 3}, base)
     assert ensemble(folder).returncode == DONE and len(set(hashes(folder))) == 3
     prepare(folder, STUDY | {"repeats": 3}, changed(base, ice__thickness_spread=0))
@@ -84,8 +85,8 @@ def test_keys_of_how_ice_is_made_have_no_effect_on_ice_that_is_read(folder, kind
 def test_what_has_an_effect_is_left_alone(folder):
     """Thickness of outlines that have none, and keys of ice that some conditions make; of the others it is said."""
     outlines = {"ice.outlines": "open.json", "ice.outlines_crs": "frame"}
-    prepare(folder, STUDY | {"parameters": {"ice.thickness": [0.03, 0.05]}}, READ["outlines"] | {
-        "ice": LOOSE["ice"] | {"outlines": "open.json", "outlines_crs": "frame"}})
+    prepare(folder, STUDY | {"parameters": {"ice.thickness": [0.03, 0.05]}},
+            changed(OUTLINES, ice__outlines="open.json"))
     assert ensemble(folder).returncode == DONE and len(set(hashes(folder))) == 2
     some = {"repeats": 2, "variants": {"made": {"ice.size": 0.8}, "map": outlines}}
     (folder / "study.yml").write_text(json.dumps(STUDY | some))
