@@ -118,15 +118,16 @@ def from_layer(path, source, how):
         raise RunError(path, f"holds the layers {', '.join(names)}", "choose one of them with --layer")
     layer = source.GetLayerByName(how.layer or names[0])
     columns = [layer.GetLayerDefn().GetFieldDefn(k).GetName() for k in range(layer.GetLayerDefn().GetFieldCount())]
-    column = how.thickness or next((name for name in columns if name.lower() == "thickness"), None)
-    if column and column not in columns:
-        raise RunError(path, f"has no column {column}", f"name one of {', '.join(columns) or 'those of another layer'}")
+    if how.thickness and how.thickness not in columns:
+        raise RunError(path, f"has no column {how.thickness}",
+                       f"name one of {', '.join(columns) or 'those of another layer'}")
     found = Map(path, crs_of_layer(path, source, layer), [], about=about_of(path, source, layer))
-    if not column:
-        found.near = [name for name in columns if "thick" in name.lower() or name.lower() in NEARLY]
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
+        column = how.thickness or thickness_column(layer, columns)
+        if not column:
+            found.near = [name for name in columns if "thick" in name.lower() or name.lower() in NEARLY]
         for feature in layer:
             add_feature(found, feature, column)
     except RuntimeError as error:
@@ -138,6 +139,17 @@ def from_layer(path, source, how):
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     mark_cut(found)
     return found
+
+
+def thickness_column(layer, columns):
+    """The column of the thickness where none is named, or None. Under another spelling it may hold anything: remarks,
+    texts with units, 0 for what nobody measured."""
+    def sound(name):
+        values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
+        return all(positive(value) is not None for value in values)
+    if "thickness" in columns:
+        return "thickness"
+    return next((name for name in columns if name.lower() == "thickness" and sound(name)), None)
 
 
 def add_feature(found, feature, column):
@@ -249,8 +261,11 @@ def from_array(path, how):
     if labels.ndim != 2 or labels.dtype.kind not in "biuf" or not labels.size:
         raise RunError(path, f"has the shape {labels.shape} and the type {labels.dtype}",
                        "save one label a pixel: rows, from the north, by columns")
-    valid = np.isfinite(labels) if labels.dtype.kind == "f" else np.ones(labels.shape, bool)
-    return of_labels(Map(path, None, []), labels, valid, None, how)
+    return of_labels(Map(path, None, []), labels, finite(labels), np.isin(labels, how.water), None, how)
+
+
+def finite(labels):
+    return np.isfinite(labels) if labels.dtype.kind == "f" else np.ones(labels.shape, bool)
 
 
 def from_image(path, source, how):
@@ -266,12 +281,15 @@ def from_image(path, source, how):
         labels, nodata = band.ReadAsArray(), band.GetNoDataValue()
     except RuntimeError as error:
         raise RunError(path, f"cannot be read ({first_line(error)})", "get it anew") from None
-    valid = np.isfinite(labels) if labels.dtype.kind == "f" else np.ones(labels.shape, bool)
+    if nodata is None and how.nodata is not None:
+        raise RunError(path, "has no nodata value", "leave --nodata out")
     if nodata is not None and nodata in how.water and how.nodata is None:
         raise RunError(path, f"has {nodata:g} both for nodata and for water (--water)",
                        "say which it is: --nodata water, or --nodata unseen")
-    if nodata is not None and how.nodata != "water":
-        valid &= labels != nodata
+    empty = np.zeros(labels.shape, bool)
+    if nodata is not None:
+        empty = np.isnan(labels) if np.isnan(nodata) else labels == nodata
+    valid = finite(labels) | empty if how.nodata == "water" else finite(labels) & ~empty
     flags = band.GetMaskFlags()
     if not flags & (gdal.GMF_ALL_VALID | gdal.GMF_NODATA):
         valid &= band.GetMaskBand().ReadAsArray() != 0
@@ -279,12 +297,16 @@ def from_image(path, source, how):
         raise RunError(path, "is placed by control points", "warp it first: gdalwarp -r near")
     reference = source.GetSpatialRef()
     found = Map(path, reference.ExportToWkt() if reference else None, [], about=about_of(path, source))
-    return of_labels(found, labels, valid, source.GetGeoTransform(can_return_null=True), how)
+    water = empty | np.isin(labels, how.water)
+    return of_labels(found, labels, valid, water, source.GetGeoTransform(can_return_null=True), how)
 
 
-def of_labels(found, labels, valid, place, how):
-    """The map of an image. place: GDAL's six numbers from column and row to coordinates, or None."""
-    if not valid.any() or np.any(labels[valid] != np.rint(labels[valid])) or np.abs(labels[valid]).max() > 2 ** 31 - 1:
+def of_labels(found, labels, valid, water, place, how):
+    """The map of an image. valid: what was seen; water: what is no ice, and need be no label, such as a nodata of NaN.
+    place: GDAL's six numbers from column and row to coordinates, or None."""
+    ice = valid & ~water
+    some = labels[ice]
+    if not valid.any() or np.any(some != np.rint(some)) or np.abs(some).max(initial=0) > 2 ** 31 - 1:
         raise RunError(found.path, "has values that are no labels (whole numbers)", "classify the image first")
     if place is None and how.pixel is None:
         raise RunError(found.path, "says nothing of its place and scale (no geotransform, no world file)",
@@ -296,10 +318,10 @@ def of_labels(found, labels, valid, place, how):
         place = (-how.pixel * columns / 2, how.pixel, 0, how.pixel * rows / 2, 0, -how.pixel)
         found.crs = LOCAL
     thick = thickness_by_value(found.path, how.thickness)
-    values = np.where(valid, labels, 0).astype(np.int32)
+    values = np.where(ice, labels, 0).astype(np.int32)
     edge = unary_union([p for p, _ in regions(valid.astype(np.int32), valid)])
     touches = prep(edge.boundary).intersects
-    for polygon, value in regions(values, valid & ~np.isin(labels, how.water)):
+    for polygon, value in regions(values, ice):
         name = f"label {value} at column {polygon.exterior.coords[0][0]:.0f}, row {polygon.exterior.coords[0][1]:.0f}"
         found.shapes.append(Shape(name, placed(bevelled(polygon), place), thick.get(value), touches(polygon),
                                   placed(Polygon(polygon.exterior), place)))

@@ -107,8 +107,8 @@ def arguments(argv):
                    "image the thickness by label: 1=0.5,2=1.2")
     p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that are no ice "
                    "(default 0); each connected region of another one is a floe")
-    p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is, where --water has the "
-                   "same value")
+    p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is (default: unseen; to be "
+                   "named where --water has the same value)")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "

@@ -35,7 +35,7 @@ _SI = {"deg": "rad", "deg/s": "rad/s", "-": ""}
 def setting(key: str, value: Any) -> str:
     """A value for a key as a case file has it: numbers are in SI units here, angles in radians."""
     unit = _keys()[key].get("unit") if key in _keys() else None
-    in_radians = unit in ("deg", "deg/s") and not isinstance(value, str)
+    in_radians = unit in ("deg", "deg/s") and value is not None and not isinstance(value, str)
     return _as_text(value) + (f" {_SI[str(unit)]}" if in_radians else "")
 
 

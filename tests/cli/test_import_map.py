@@ -264,6 +264,22 @@ def test_formats_and_layers(tmp_path):
         np.testing.assert_allclose(a, b, atol=1e-9)
 
 
+@pytest.mark.parametrize("values, read", [([1.2, 0.5], True), ([1.2, None], True), (["1.2 m", "0.5 m"], False),
+                                          ([1.2, 0], False)])
+def test_a_column_of_another_spelling_is_the_thickness_if_it_can_be(tmp_path, values, read):
+    """And no reason to refuse a map if it cannot, unless it is named."""
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS[:2]])
+    text = json.loads(map_.read_text())
+    for feature, value in zip(text["features"], values):
+        feature["properties"]["THICKNESS"] = value
+    map_.write_text(json.dumps(text))
+    found = map_read.read(map_, map_read.Reading())
+    assert ([s.thickness for s in found.shapes] == values) == read and found.near == ([] if read else ["THICKNESS"])
+    if not read:
+        with pytest.raises(RunError, match="is no thickness in metres"):
+            map_read.read(map_, map_read.Reading(thickness="THICKNESS"))
+
+
 def image(path, labels, crs=None, corner=(0.0, 0.0), pixel=2.0, nodata=None, driver="GTiff"):
     file = gdal.GetDriverByName("MEM").Create("", labels.shape[1], labels.shape[0], 1, gdal.GDT_Byte)
     file.SetGeoTransform((corner[0], pixel, 0, corner[1], 0, -pixel))
@@ -383,6 +399,23 @@ def test_nodata_that_is_water(tmp_path):
     rings, record = outlines(plain)
     assert counted(record)["cut kept"] == 1 and plane_area(np.array(rings[0])) > 0
     assert record["floes"]["area_m2"] == pytest.approx(4 * np.count_nonzero(labels[:, :30]), rel=5e-3)
+
+
+@pytest.mark.parametrize("value, kind", [(255, gdal.GDT_Byte), (np.nan, gdal.GDT_Float32), (-3e38, gdal.GDT_Float32)])
+def test_nodata_that_is_water_need_not_be_a_label(tmp_path, value, kind):
+    """It made a floe around the others. Where the image names none, there is nothing to say of it."""
+    def tif(name, nodata):
+        file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / name), 60, 60, 1, kind)
+        file.SetGeoTransform((0.0, 2.0, 0, 0.0, 0, -2.0))
+        if nodata:
+            file.GetRasterBand(1).SetNoDataValue(nodata)
+        labels = np.full((60, 60), value, np.uint8 if kind == gdal.GDT_Byte else np.float32)
+        file.GetRasterBand(1).WriteArray(discs(labels, (20, 20, 9, 1), (40, 40, 9, 2)))
+        return tmp_path / name
+    rings, record = outlines(tif("map.tif", value), "--crs", "local", "--nodata", "water")
+    assert len(rings) == 2 and "cut kept" not in counted(record)
+    assert "has no nodata value" in outlines(tif("unnamed.tif", None), "--crs", "local", "--nodata", "water", code=IO,
+                                             name="no.geojson")
 
 
 def test_a_map_that_is_turned_is_no_rectangle(tmp_path):

@@ -83,6 +83,8 @@ def test_values_of_other_types(tmp_path):
     case = bergtow.Case(SHORT)
     case.update({"guard.escape": np.bool_(False), "tow.speed": np.float64(0.1), "ice.field": None})
     assert (case["guard.escape"], case["tow.speed"], case["ice.field"]) == (False, 0.1, None)
+    case["ice.origin_lon"] = None  # of a key in degrees
+    assert case.overrides["ice.origin_lon"] == "none"
     with pytest.raises(bergtow.BergtowError, match="none.h5"):
         bergtow.Simulation(SHORT | {"ice": {"field": tmp_path / "none.h5"}})
     with pytest.raises(TypeError, match="is nothing that a case can hold"):
