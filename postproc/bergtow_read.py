@@ -127,19 +127,9 @@ def case_value(case, key, default=np.nan):
         return default
 
 
-def _legs(x, points, headings):
-    """On which leg of its tow a body is at each place [S, 2]: on the next one as soon as that is nearer, so that a path
-    which crosses itself is followed in order."""
-    lengths = np.append(np.hypot(*np.diff(points, axis=0).T), np.inf)
-    def far(place, k):
-        along = np.clip(np.dot(place - points[k], headings[k]), 0.0, lengths[k])
-        return np.hypot(*(place - points[k] - along * headings[k]))
-    out, k = [], 0
-    for place in x:
-        while k + 1 < len(points) and far(place, k + 1) < far(place, k):
-            k += 1
-        out.append(k)
-    return np.array(out, dtype=int)
+def _pairs(text):
+    """[(number, number)] of a sequence of pairs, as the resolved case has them."""
+    return re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", text)
 
 
 class Run:
@@ -298,28 +288,45 @@ class Run:
         return window if np.isfinite(window).all() else None
 
     @property
-    def legs(self):
-        """(points [K, 2], unit vectors [K, 2]) of the ordered tow: where each leg begins, and its heading; the last
-        goes on without end."""
-        pairs = re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", self.case.get("tow.waypoints", ""))
-        points = np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float)
-        if len(points) == 1:
+    def ordered_speed(self):
+        """The speed that the case orders at each sample [S], m/s; NaN where it orders none."""
+        programme, time = np.array(_pairs(self.case.get("tow.programme", "")), dtype=float), self["time"]
+        if len(programme):
+            return np.interp(time, *programme.T)
+        ramp = self.value("tow.ramp", 0.0)
+        return self.value("tow.speed") * (np.clip(time / ramp, 0.0, 1.0) if ramp > 0 else np.ones_like(time))
+
+    @property
+    def headings(self):
+        """[K, 2], unit vectors along the legs of the ordered tow."""
+        pairs = _pairs(self.case.get("tow.waypoints", ""))
+        if not pairs:
             heading = self.value("tow.direction", 0.0)
-            return points, np.array([[np.cos(heading), np.sin(heading)]])
-        ways = np.diff(points, axis=0)
-        return points[:-1], ways / np.hypot(*ways.T)[:, None]
+            return np.array([[np.cos(heading), np.sin(heading)]])
+        ways = np.diff(np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float), axis=0)
+        return ways / np.hypot(*ways.T)[:, None]
 
     @property
     def way(self):
         """How far the body has come along the ordered tow [S], m, from the first sample on: sway counts nothing, and
-        what drives it back counts against it."""
+        what drives it back counts against it.
+
+        Which leg it is on cannot be told from its place alone, for legs may meet or lie side by side; nor by the
+        event, since the body may come a line length after what tows it. So it changes legs where that makes its way
+        longest, once the way-point is passed: a body that cuts the corner has turned by half the angle there, and one
+        that is towed back is about to return.
+        """
         def find():
-            points, headings = self.legs
             x = np.column_stack([self["body_x"], self["body_y"]])
-            leg = np.zeros(len(x) - 1, dtype=int)
-            if len(headings) > 1:
-                leg = _legs(x[1:], points, headings)
-            return np.append(0.0, np.cumsum(np.sum(np.diff(x, axis=0) * headings[leg], axis=1)))
+            along = (x - x[0]) @ self.headings.T
+            way, time = along[:, 0].copy(), self["time"]
+            for event in self.events:
+                if event["kind"] != "waypoint" or event["subject"] >= along.shape[1]:
+                    continue
+                leg = along[:, event["subject"]]
+                k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before it
+                way[k:] = leg[k:] + np.maximum.accumulate(way[k:] - leg[k:])
+            return way
         return self._once("way", find)
 
     def made_good(self, start, end):

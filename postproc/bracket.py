@@ -85,10 +85,19 @@ class Bracket:
             return YES
         return NO if verdict(good + failed, bad, self.share) == NO else OPEN
 
+    def decidable(self, p, failed):
+        """May the trials that are left to a point decide it, after so many without an outcome?"""
+        rest = max(0, self.most - p.n)
+        return (self.verdict(p.good + rest, p.bad, failed) != OPEN or
+                self.verdict(p.good, p.bad + rest, failed) != OPEN)
+
     def more(self, value):
-        """Is the value undecided, and may more trials decide it?"""
+        """Is the value undecided, and worth more trials? After some without an outcome only while the rest may decide
+        it. Where all have one its share is near q, and every trial is made: stopping there, too, would save a quarter
+        of the trials and double the scatter of the estimate."""
         p = self.point(value)
-        return self.judged(value) == OPEN and p.n < self.most and not p.spent
+        return self.judged(value) == OPEN and p.n < self.most and not p.spent and (
+            not p.failed or self.decidable(p, p.failed))
 
     def ends(self):
         """(the value of a success, that of a failure) next to each other; where there are none of one kind, None and

@@ -127,8 +127,8 @@ def without_intervals(found):
 
 def of_ensemble(e, of=OF[0], computed=None):
     """The budget of a number of an ensemble; what the computation adds, numerics(), is known of means alone. Where
-    members failed, or have no such number, nobody knows which values are missing, and there are no intervals. Errors:
-    RunError."""
+    members of the sample failed, or have no such number, nobody knows which values are missing, and there are no
+    intervals. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study")
     if "fields: common" in e.study:
@@ -143,13 +143,13 @@ def of_ensemble(e, of=OF[0], computed=None):
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
-    failed = e.reasons(FAILED)
-    if failed or lacking:
+    if lacking or np.any(e.status[sample] == FAILED):
         found = without_intervals(found)
     return found | {"title": e.title, "of": of, "units": str(units),
                     "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n,
-                    "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows), "failed": failed,
-                    "without_number": lacking, "copies": e.copies}
+                    "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows),
+                    "failed": e.reasons(FAILED), "failed_beyond": [e.name[m] for m in np.flatnonzero(
+                        e.status == FAILED) if m not in sample], "without_number": lacking, "copies": e.copies}
 
 
 def of_all(e, some, converge):

@@ -110,8 +110,10 @@ def warnings(found):
                       "are depends on how long a tow takes." if beyond else ""))
     if failed := found.get("failed"):
         name, why = next(iter(failed.items()))
-        out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). What made them "
-                   "fail may be what the budget asks for: there are no intervals.")
+        within = set(failed) - set(found.get("failed_beyond", []))
+        out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). " + (
+            "What made them fail may be what the budget asks for: there are no intervals." if within else
+            "They lie beyond the first gap, and are not in this sample."))
     if lacking := found.get("without_number"):
         out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "
                    "intervals.")

@@ -8,7 +8,8 @@ which half of the tows no longer make it.
 A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) along the ordered tow, in
 the mean over the window and over its last quarter, and no branch of its line parts. The last quarter, because a tow
 that has come to rest in the ice has a mean that only tells for how long it has been there: without it the limit is one
-of run.duration. Rejected: windows in which the body stood still (stalled_windows), since a tow that stops and goes on
+of run.duration. Of the window the time counts in which tow.programme orders that speed: no tow keeps it through a stop
+that is ordered. Rejected: windows in which the body stood still (stalled_windows), since a tow that stops and goes on
 makes it; they are counted beside. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
 line that may part; a prescribed speed is kept whatever it takes. The search is that of bracket.py; what it has tried is
 a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where periodic
@@ -22,6 +23,7 @@ from pathlib import Path
 
 import command  # first: it has words for packages that are missing
 import bracket
+import compared
 import domain_width
 import findings
 import stat_mean
@@ -37,7 +39,7 @@ POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
 PARTS = 16               # the range over the resolution
 STOPPED = 0.1            # of tow.speed: what is slower has stopped
 RANGES = {"ice.concentration": ("0.2", "0.95")}
-LATE = 0.25              # of the window: in which a tow must still keep the speed
+LATE = 0.25              # of that time: in which a tow must still keep the speed
 FAILING = 3              # runs that fail at a value before it is given up
 
 
@@ -46,7 +48,7 @@ class Trial:
     """What one run says."""
 
     field: int
-    speed: float      #: m/s, mean over the window
+    speed: float      #: m/s, mean over the time of the window in which the speed to be kept is ordered
     late: float       #: that over the last quarter of it
     stood: bool       #: it stood still for a while, held by the ice
     parted: bool
@@ -59,17 +61,30 @@ class Trial:
         return min(self.speed, self.late) >= least and not self.parted
 
 
-def trial(run, number):
+def kept(run, least):
+    """Speeds made good, m/s, over the time of the window in which the tow is ordered to be as fast as that, and over
+    the last quarter of this time; of the whole window where it never is."""
+    time, (start, end) = run["time"], run.window
+    fast = run.ordered_speed >= least * (1 - 1e-9)
+    counts = fast[1:] & fast[:-1]
+    if not np.any(counts & (time[1:] > start) & (time[:-1] < end)):
+        counts[:] = True
+    clock, way = (np.append(0.0, np.cumsum(np.diff(x) * counts)) for x in (time, run.way))
+    first, last = np.interp([start, end], time, clock)
+    since = np.array([first, last - LATE * (last - first)])
+    return (np.interp(last, clock, way) - np.interp(since, clock, way)) / (last - since)
+
+
+def trial(run, number, least):
     """Of a run that is there. Errors: RunError."""
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer")
-    speed = run.speed_made_good
-    if not np.isfinite(speed):
+    if not np.isfinite(run.speed_made_good):
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
-    start, end = run.window
-    return Trial(number, speed, run.made_good(end - LATE * (end - start), end), run.number("stalled_windows") > 0,
+    speed, late = map(float, kept(run, least))
+    return Trial(number, speed, late, run.number("stalled_windows") > 0,
                  any(e["kind"] == "line_broken" for e in run.events),
                  run.number("mean_tow_force_n"), run.number("peak_line_tension_n"), widths, needed)
 
@@ -87,6 +102,7 @@ class Condition:
     failed: dict = field(default_factory=dict)   #: [why] by value
     wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None where that of the case will do
     why: str = ""     #: the search ended before it was through
+    case: dict = field(default_factory=dict)     #: {key: text} of the case under the value of --for
 
 
 @dataclass
@@ -131,7 +147,7 @@ class Search:
                 point.failed += 1
                 continue
             with Run(self.runs.path(name, i)) as run:
-                some.append(trial(run, i + 1))
+                some.append(trial(run, i + 1, self.least))
             good = int(some[-1].made(self.least))
             point.good, point.bad = point.good + good, point.bad + 1 - good
         if self.say:
@@ -195,10 +211,10 @@ def contradiction(s):
 
 
 def failures(s):
-    """Of a value that would be decided without the runs that failed, "" where there is none."""
-    return next((f"at {p.value:.4g} {p.failed} runs failed, which could overturn {p.good} of {p.n}"
-                 for p in s.points.values()
-                 if s.judged(p.value) == bracket.OPEN and s.verdict(p.good, p.bad, 0) != bracket.OPEN), "")
+    """Of a value at the limit that only the runs that failed leave undecided, "" where there is none."""
+    return next((f"at {p.value:.4g} {p.failed} of {p.n + p.failed} runs failed, which leaves it undecided"
+                 for p in s.points.values() if p.failed and s.judged(p.value) == s.expected(p.value) == bracket.OPEN
+                 and not s.more(p.value) and s.decidable(p, 0)), "")
 
 
 def found_of(c, least):
@@ -226,12 +242,13 @@ def resolved(binary, case, sets):
     return parse_case(checked(binary, case, sets, "--scale", "1"))
 
 
-def number_of(binary, case, sets, key, text):
-    """A value of a key in SI units."""
-    value = case_value(resolved(binary, case, [*sets, f"{key}={text}"]), key)
+def with_number(binary, case, sets, key, text):
+    """(the case with a value of a key, that value in SI units)."""
+    found = resolved(binary, case, [*sets, f"{key}={text}"])
+    value = case_value(found, key)
     if not np.isfinite(value):
         raise RunError(case, f"{key}={text} is no number", "search a key that is a number")
-    return value
+    return found, value
 
 
 def conditions(a, binary, given, start, end, resolution):
@@ -247,7 +264,7 @@ def conditions(a, binary, given, start, end, resolution):
     out = []
     for k, text in enumerate(texts):
         case = resolved(binary, a.case, [*given, f"{key}={text}"])
-        out.append(Condition(f"c{k + 1}", f"{key} {text}", case_value(case, key), {key: text}, search()))
+        out.append(Condition(f"c{k + 1}", f"{key} {text}", case_value(case, key), {key: text}, search(), case=case))
     return out
 
 
@@ -316,11 +333,12 @@ def main(argv=None):
     a.case, began, binary = a.case.resolve(), time.monotonic(), program()
     case = resolved(binary, a.case, a.set)
     check(case, a.search)
-    start, end = (number_of(binary, a.case, a.set, a.search, text) for text in (a.start, a.end))
+    ends = [with_number(binary, a.case, a.set, a.search, text) for text in (a.start, a.end)]
+    start, end = (value for _, value in ends)
     if start == end:
         raise RunError(a.search, "the range has no extent", "give --from and --to two values")
     def number(key, text, otherwise):
-        return number_of(binary, a.case, a.set, key, text) if text else otherwise
+        return with_number(binary, a.case, a.set, key, text)[1] if text else otherwise
     resolution = number(a.search, a.resolution, abs(end - start) / PARTS)
     least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
     last = began + 60 * a.budget
@@ -341,8 +359,10 @@ def main(argv=None):
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
     unit, across = case.get(a.search, "").partition(" ")[2], (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
+    # keys whose default follows from what is varied are varied with it
+    alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
     found = {
-        "case": a.case.name, "values": {k: v for k, v in case.items() if k not in (a.search, across)},
+        "case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
         "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
         "range": [start, end], "resolution": resolution, "for": across,
         "for_unit": case.get(across, "").partition(" ")[2],

@@ -35,6 +35,11 @@ def limits(found, markdown=False):
     return table(head, rows, markdown)
 
 
+def least_of(values):
+    """What bounds an interval of their mean: 0, unless some are below, as speeds are where a body was driven back."""
+    return min((x for x in values if x is not None and x < 0), default=0.0)
+
+
 def curve(found, markdown=False):
     head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted",
             "speed, m/s (95 %)", "mean tow force", "largest tension: mean", "of all"]
@@ -42,8 +47,7 @@ def curve(found, markdown=False):
     for c in found["conditions"]:
         for p in c["points"]:
             low, high = p["mean_speed_95"]
-            least = min(0.0, *p["speed"])  # none is below where none was driven back
-            band = "" if low is None else f" ({number(max(low, least))} to {number(high)})"
+            band = "" if low is None else f" ({number(max(low, least_of(p['speed'])))} to {number(high)})"
             tension = [x for x in p["tension"] if x is not None]
             made = f"{p['made']} of {p['fields']}"
             rows.append([condition(found, c), value(found, p["value"]), made, str(p.get("stood_still", "–")),
@@ -61,7 +65,8 @@ def meaning(found):
     more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that "
             "failed could have changed it.") if failed else ""
     return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
-            f"over the window and over its last quarter{line}. Stood still: tows that the ice held for a while. "
+            f"over the window, as far as it is ordered to be so fast there, and over the last quarter of that "
+            f"time{line}. Stood still: tows that the ice held for a while. "
             f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "
             f"fewer, each at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
             f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
@@ -108,7 +113,8 @@ def _curve(axes, c, name, colour, factor, unit):
     for at, p in zip(x, c["points"]):
         axes.plot(np.full(p["fields"], at), _numbers(p[name]) / unit, ".", color=colour, alpha=0.35, markersize=5)
     axes.plot(x, mean / unit, color=colour, label=c["label"])
-    axes.fill_between(x, np.maximum(low, 0) / unit, high / unit, color=colour, alpha=0.15, linewidth=0)
+    least = np.array([least_of(p[name]) for p in c["points"]])
+    axes.fill_between(x, np.maximum(low, least) / unit, high / unit, color=colour, alpha=0.15, linewidth=0)
 
 
 def figure(found):

@@ -66,7 +66,7 @@ def slower_start(run, k):
 def longer(run, k):
     """Half the length more ahead of the body; the end behind it stays where it is. Errors: RunError for a tow that does
     not go along the domain."""
-    length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.legs[1][:, 0]
+    length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.headings[:, 0]
     if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
         raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
                        "take the width, or leave the length out of --vary")

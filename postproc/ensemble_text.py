@@ -224,7 +224,7 @@ def report(s, markdown=False):
     if s["waiting"]:
         lines.append(
             f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
-            f"({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields."
+            f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields."
         )
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))

@@ -222,6 +222,16 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
 
 
+def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp_path):
+    """It is named all the same."""
+    status = {(10, 0): made_up.WAITING, (15, 0): made_up.FAILED}
+    found = budget.of_ensemble(Ensemble(with_status(tmp_path / "a", lambda c, r: status.get((c, r), made_up.FINISHED))))
+    assert np.isfinite([*found["mean_95"], *found["fields"]["sd_95"]]).all()
+    assert list(found["failed"]) == found["failed_beyond"] == ["c016-r001"]
+    said = budget_text.text(plain(found | {"numerics": None}))
+    assert "c016-r001: it diverged). They lie beyond the first gap" in said and "no intervals" not in said
+
+
 def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
     whole = Ensemble(with_status(tmp_path / "a", lambda c, r: 1))
     cut = Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 or c < 10))

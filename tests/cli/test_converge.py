@@ -232,7 +232,7 @@ class Towed:
     value = {"domain.length": 300.0, "domain.ahead": np.nan, "domain.x0": 0.0, "body.x": 240.0}.get
 
     def __init__(self, *headings):
-        self.legs = np.zeros((len(headings), 2)), np.array([[np.cos(h), np.sin(h)] for h in np.radians(headings)])
+        self.headings = np.array([[np.cos(h), np.sin(h)] for h in np.radians(headings)])
 
 
 def test_the_length_grows_ahead_of_the_body():
