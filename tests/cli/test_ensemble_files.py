@@ -64,7 +64,8 @@ def test_a_file_that_some_members_name(tmp_path, axis):
 def test_outlines_and_bases_that_have_changed(tmp_path):
     outlines = tmp_path / "floes.json"
     outlines.write_text(json.dumps(SQUARE))
-    base = changed(TOW, run__duration=4, ice__outlines="floes.json", ice__outlines_crs="frame")
+    base = changed(TOW, run__duration=4, ice__outlines="floes.json", ice__outlines_crs="frame", ice__concentration=None,
+                   ice__size=None)
     prepare(tmp_path, STUDY | {"base": "near.yml", "repeats": 1}, base)
     (tmp_path / "near.yml").write_text("base: base.yml\ntow: {speed: 0.12}\n")
     assert ensemble(tmp_path).returncode == DONE
