@@ -260,7 +260,7 @@ def test_a_force_cannot_change_what_steps(tmp_path):
 
 @pytest.fixture
 def ctrl_c():
-    """Ctrl-C as a program in a terminal has it; a test run in the background ignores it, and so would what it starts."""
+    """Ctrl-C as in a terminal; a test run in the background ignores it, and so would what it starts."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
