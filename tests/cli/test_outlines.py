@@ -413,7 +413,7 @@ def test_the_concentration_is_that_of_the_ice_region(tmp_path):
     again = changed(BASE, ice={"field": "out.h5", "nonconvex": "split"})
     warned, read_again = warnings_of(tmp_path, again)
     assert read_again == pytest.approx(concentration, rel=1e-12)
-    assert any("refers to 96.8" in w and "the domain less the body has 196.8" in w for w in warned)
+    assert any("refers to an ice region of 96.8" in w and "the domain less the body has 196.8" in w for w in warned)
 
 
 def test_more_ice_outside_the_region_than_would_fit_into_it(tmp_path):
