@@ -75,7 +75,7 @@ def changed(base, /, **changes):
 
 
 MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
-        "size_exponent", "thickness", "thickness_law", "thickness_spread", "shake")
+        "size_exponent", "thickness", "thickness_law", "thickness_spread", "shake", "x_min", "x_max", "y_min", "y_max")
 
 
 def reading(base, field):

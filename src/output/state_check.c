@@ -79,9 +79,10 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     if (s->faulty) return;
     bt_snapshot_want(s, f->concentration >= 0 && f->concentration <= 1 + 1e-9, "field/concentration", -1,
                      "is no concentration");
-    // Floes outside the ice region have no part in its concentration; a field without floes may have no ice region, and
-    // so no area.
-    const double within = bt_min(sum, f->concentration * f->ice_area);
+    // Floes outside the ice region have no part in its concentration, and a file that was read may have such; a field
+    // without floes may have no ice region, and so no area.
+    const bool outside = f->outlines.outside_area > 0 || f->outlines.own_area > 0;
+    const double within = outside ? bt_min(sum, f->concentration * f->ice_area) : sum;
     if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(true, f->n, size, within, f->ice_area, why))
         want_ice(s, "field/ice_area", -1, why);
     const bt_outline_counts *c = &f->outlines;
