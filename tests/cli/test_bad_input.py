@@ -174,7 +174,7 @@ def test_folder_as_case(folder):
 
 
 def field_case(folder, name):
-    (folder / "bad.yml").write_text(GOOD.replace("size: 1", f"field: {name}"))
+    (folder / "bad.yml").write_text(GOOD.replace("concentration: 0.3, size: 1", f"field: {name}"))
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
