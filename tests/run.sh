@@ -24,7 +24,7 @@ one() {
         *) f=1 ;;
         esac ;;
     *)
-        "$2" >"$file.log" 2>&1
+        timeout 900 "$2" >"$file.log" 2>&1 # one that hangs is a failure, and no end of the others
         code=$?
         p=$(sed -n 's/.*PASSED.* \([0-9][0-9]*\) test(s).*/\1/p' "$file.log" | tail -1)
         f=$(sed -n 's/^ *\([0-9][0-9]*\) FAILED TEST(S).*/\1/p' "$file.log" | tail -1)

@@ -89,6 +89,9 @@ void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *wa
 /// Warning of ice that was made: n floes whose mean diameter, m, is not that of the size law.
 void bt_field_size_warn(const bt_case *c, bt_idx n, double mean_size, bt_errors *warnings);
 
+/// Mean diameter of the circles of the floes' areas, m; NaN without floes.
+double bt_field_mean_size(const bt_field *f);
+
 /// Thickness of floe i by the law of the case, m.
 double bt_field_thickness(const bt_case *c, bt_idx i);
 

@@ -7,7 +7,6 @@
 #include "base/checksum.h"
 #include "case/cost.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,14 +57,6 @@ static bool is_geojson(const char *path)
     return dot && (!strcasecmp(dot, ".geojson") || !strcasecmp(dot, ".json"));
 }
 
-/// Of the circles of the floes' areas, m; NaN without floes.
-static double mean_diameter(const bt_field *f)
-{
-    double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) sum += 2 * sqrt(f->area[i] / BT_PI);
-    return f->n > 0 ? sum / f->n : NAN;
-}
-
 int bt_cmd_field(int argc, char **argv)
 {
     options o = {0};
@@ -94,7 +85,7 @@ int bt_cmd_field(int argc, char **argv)
         status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     bt_errors warnings = {0};
     if (status == BT_OK) {
-        const double took = bt_clock() - start, size = mean_diameter(&f);
+        const double took = bt_clock() - start, size = bt_field_mean_size(&f);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
                f.concentration, f.ice_area, size, bt_case_reads_field(&c) ? "read" : "made", took);
         bt_outline_warn(&f.outlines, &c, &warnings);

@@ -43,6 +43,13 @@ static void reserve(bt_field *f, int64_t floes, int64_t n_vertices)
     }
 }
 
+double bt_field_mean_size(const bt_field *f)
+{
+    double sum = 0;
+    for (bt_idx i = 0; i < f->n; i++) sum += sqrt(4 * f->area[i] / BT_PI);
+    return f->n ? sum / f->n : NAN;
+}
+
 void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness)
 {
     bt_idx i = f->n;

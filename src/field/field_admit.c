@@ -179,16 +179,8 @@ static void check_bounds(const bt_case *c, const place *p, bt_idx i)
 /// Ready for pairs of floes of f, wherever in the domain they lie.
 static void begin_places(place *p, bt_region *y, const bt_case *c, const bt_field *f)
 {
-    bt_case whole = *c;
-    whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
-    whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_errors ignored = {0}; // no room for ice is reported by the reader
-    bt_region_init(y, &whole, 0, &ignored);
-    bt_errors_free(&ignored);
-
-    double size = 0;
-    for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI) / f->n;
-    p->allowed = bt_max(c->solver.slop, 1e-9) * size;
+    bt_region_of_domain(y, c);
+    p->allowed = bt_max(c->solver.slop, 1e-9) * bt_field_mean_size(f);
     p->parts = bt_alloc((size_t)f->n, sizeof *p->parts);
     for (bt_idx i = 0; i < f->n; i++) {
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);

@@ -14,15 +14,11 @@
 /// The area that the file's concentration refers to, and that of the domain.
 static void note_region(const bt_case *c, bt_field *f)
 {
-    bt_case whole = *c;
-    whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
-    whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
     bt_region y;
-    bt_errors unheard = {0}; // no room for ice that is to be made: here it is there
+    bt_region_of_domain(&y, c);
     f->outlines.own_area = f->ice_area;
-    if (bt_region_init(&y, &whole, 0, &unheard) == BT_OK) f->outlines.region_area = y.ice_area;
+    f->outlines.region_area = y.ice_area;
     bt_region_free(&y);
-    bt_errors_free(&unheard);
 }
 
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)

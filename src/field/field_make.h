@@ -27,6 +27,8 @@ typedef struct bt_region {
 
 /// Region, obstacles and ice area of a case. clearance: m. Errors: BT_ERR_CASE.
 bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err);
+/// The whole domain as a region, for ice that is there: no room for more is no error.
+void bt_region_of_domain(bt_region *y, const bt_case *c);
 void bt_region_free(bt_region *y);
 /// Area of a polygon within the region, m², with its images over the edges at which the domain of the case wraps.
 double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const double *v);

@@ -158,6 +158,16 @@ bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_er
     return BT_OK;
 }
 
+void bt_region_of_domain(bt_region *y, const bt_case *c)
+{
+    bt_case whole = *c;
+    bt_errors ignored = {0};
+    whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
+    whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
+    bt_region_init(y, &whole, 0, &ignored);
+    bt_errors_free(&ignored);
+}
+
 void bt_region_free(bt_region *y)
 {
     free(y->obstacles);

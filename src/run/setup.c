@@ -408,8 +408,7 @@ static bool check_apart(const bt_case *c, const bt_field *f, bt_world *w, const 
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
 {
     double sum = 0, v[2 * BT_MAX_VERTICES];
-    for (bt_idx i = 0; i < f->n; i++) sum += sqrt(4 * f->area[i] / BT_PI);
-    double size = f->n ? sum / f->n : c->ice.size;
+    double size = f->n ? bt_field_mean_size(f) : c->ice.size;
     if (!f->n && c->n_floes) {
         for (bt_idx i = 0; i < c->n_floes; i++)
             sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&c->floes[i], v), v).area / BT_PI);
