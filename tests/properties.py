@@ -120,6 +120,12 @@ def balances(case, folder):
 
 # ---- scenes that can be turned and moved ----
 
+def floe_size(case):
+    """Diameter of a typical floe; the power law has its two ends only."""
+    ice = case["ice"]
+    return ice["size"] if "size" in ice else math.sqrt(ice["size_min"] * ice["size_max"])
+
+
 def by_hand(table, folder, seed, parts, number):
     """The scene of a seed as floes given by hand, with nothing left to defaults that know of an axis."""
     case = drawn(table, seed, parts - {"lead"})
@@ -145,7 +151,7 @@ def by_hand(table, folder, seed, parts, number):
     with h5py.File(folder / "field.h5") as f:
         at, corners = f["floes/offsets"][:], f["floes/vertices"][:]
         pose, thickness = f["floes/pose"][:], f["floes/thickness"][:]
-    speed = case["run"]["dt"] and value_of(case, "ice.size") / case["run"]["dt"] / 30
+    speed = floe_size(case) / case["run"]["dt"] / 30
     floes = []
     for k, (x, y, yaw) in enumerate(pose):
         floes.append({"shape": "polygon", "vertices": corners[at[k]:at[k + 1]].tolist(), "x": x, "y": y,
@@ -153,7 +159,7 @@ def by_hand(table, folder, seed, parts, number):
     floes += case.pop("floes", [])
     for f in floes:
         f["vx"], f["vy"] = rng.uniform(-speed, speed), rng.uniform(-speed, speed)
-        f["yaw_rate"] = rng.uniform(-1, 1) * min(360, math.degrees(speed / value_of(case, "ice.size")))
+        f["yaw_rate"] = rng.uniform(-1, 1) * min(360, math.degrees(speed / floe_size(case)))
         if f.get("fixed"):
             del f["vx"], f["vy"], f["yaw_rate"]
     x, y = body.get("x", d["x0"]), body.get("y", d["y0"])
@@ -353,7 +359,7 @@ def square(p, q):
 def generic(case, folder, name):
     """Frames before two floes that are near have edges that face each other squarely. Which of the two edges is then
     the reference of the first contact is decided by the numbers of the floes, so results depend on them."""
-    size, d = value_of(case, "ice.size"), case["domain"]
+    size, d = floe_size(case), case["domain"]
     with h5py.File(folder / name / "result.h5") as f:
         at, corners, pose = f["floes/offsets"][:], f["floes/vertices"][:], f["frames/pose"][:]
     own = [corners[at[k]:at[k + 1]] for k in range(len(at) - 1)]
@@ -394,7 +400,7 @@ def as_seen(table, folder, seed, parts, number, seen):
 
 def apart(case, one, other):
     """(quantity, share of its scale) of what is farthest from what was expected."""
-    size = value_of(case, "ice.size")
+    size = floe_size(case)
     speed = value_of(case, "solver.reference_speed")
     d = case["domain"]
     worst = []

@@ -57,7 +57,7 @@ extern "C" {
 #endif
 
 enum {
-    BT_MAX_FORCE_LAWS = 24,
+    BT_MAX_FORCE_LAWS = 64,
     BT_MAX_FORCE_SERIES = 2 * BT_MAX_FORCE_LAWS,
     BT_MAX_FORCE_OWN = 8,      ///< numbers of a law's own in a world
     BT_MAX_STREAMS = 8,        ///< in one load
