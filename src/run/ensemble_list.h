@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// What a call of an ensemble knows of its members, and what it says of them; private to src/run/ensemble*.c.
+#ifndef BERGTOW_ENSEMBLE_LIST_H
+#define BERGTOW_ENSEMBLE_LIST_H
+
+#include "bergtow/ensemble.h"
+#include "run/ensemble_record.h"
+#include "run/study_files.h"
+
+enum { BT_MOST_REPORTED = 10 }; ///< failed members that are reported one by one
+
+typedef struct bt_entry {
+    bt_member m;
+    int64_t index; ///< among the members of the study
+    char *folder;
+    int64_t turn;  ///< repeat where wall time is limited: a call that is stopped leaves whole fields; otherwise 0
+    double cost;   ///< estimated, s of one core
+    /// within a turn the largest comes first: the cost; 0 where wall time is limited and the conditions are a random
+    /// sample: those that are done are to be one, too, and the costly ones alone have another mean
+    double first;
+    bool settled;  ///< finished or failed, as far as this process knows
+    bool paused;   ///< has done the steps that this call was to do
+    int attempts;  ///< starts without an end
+} bt_entry;
+
+typedef struct bt_ensemble {
+    const bt_comm *world, *group;
+    const bt_study *s;
+    const bt_ensemble_options *o;
+    bt_entry *list;     ///< [n] in the order in which they are taken
+    int64_t n, before;  ///< members; settled when this call began
+    double cost_before; ///< of those
+    double most_floes;  ///< of the member with the most
+    int64_t fixed;      ///< conditions whose ice does not depend on the seed
+    int n_groups, of_group, threads, jobs, lock; ///< lock: descriptor held for the member at hand
+    /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
+    int alone;
+    int64_t lost;       ///< members whose failure could not be recorded
+    bt_member_records records;
+    bt_study_files files; ///< on the first rank of a group
+    double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
+    bt_errors *err;
+} bt_ensemble;
+
+/// A line of journal.jsonl. wall: s, NAN = unknown.
+void bt_ensemble_journal(const bt_ensemble *e, const char *event, const bt_member *m, double wall, int code);
+
+/// The wall time that is left, s; infinite where none was given.
+double bt_ensemble_wall_left(const bt_ensemble *e);
+
+/// Has its process died so often that it is run alone?
+bool bt_entry_is_suspect(const bt_entry *x);
+
+/// Look at the folder of a member whether it has been settled meanwhile.
+void bt_entry_look(bt_entry *x);
+
+/// Collective. The members in the order in which they are taken; each that has finished is checked.
+void bt_ensemble_list(bt_ensemble *e);
+
+/// What is settled when the work begins.
+void bt_ensemble_count_settled(bt_ensemble *e);
+
+/// Collective. Each rank makes what it knows of sound files known to the others, so that none reads them again.
+void bt_ensemble_share_records(bt_ensemble *e);
+
+/// Print that a member has ended, after `wall` s, and what is left.
+void bt_ensemble_say(const bt_ensemble *e, const bt_entry *x, bt_status status, double wall);
+
+/// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no
+/// hole.
+bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err);
+
+#endif
