@@ -94,19 +94,18 @@ bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
         if (worst == BT_OK) worst = of;
     }
     if (n.failed > BT_MOST_REPORTED)
-        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - BT_MOST_REPORTED,
-                      e->o->dir);
+        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt",
+                      n.failed - BT_MOST_REPORTED, e->o->dir);
     if (n.unsound > BT_MOST_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - BT_MOST_REPORTED);
     if (status == BT_ERR_SIGNAL)
         bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
                       bt_ensemble_wall_left(e) <= 0 ? "the limit of wall time" : "a signal", n.left);
     else if (n.at_work)
-        bt_errors_add(
-            err,
-            "%" PRId64
-            " members are being worked on by other processes; the same call takes them in when those have ended",
-            n.at_work);
+        bt_errors_add(err,
+                      "%" PRId64 " members are being worked on by other processes; the same call takes them in when "
+                      "those have ended",
+                      n.at_work);
     else if (n.left && worst == BT_OK)
         bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
