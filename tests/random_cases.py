@@ -268,7 +268,7 @@ class Scene:
         dt = v["run.dt"] = self.size / self.most * d.log(0.003, 0.5 if d.chance(0.1) else 0.1)
         self.duration = v["run.duration"] = dt * round(d.log(STEPS, 8 * STEPS))
         if "water.tide.major" in v and d.chance(0.7):
-            v["water.tide.period"] = self.duration * d.log(0.1, 100)
+            v["water.tide.period"] = max(20 * dt, self.duration * d.log(0.1, 100)) # at least 20 steps
 
     def fill_with_ice(self):
         d, v, size = self.d, self.value, self.size

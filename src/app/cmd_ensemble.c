@@ -81,9 +81,10 @@ int bt_cmd_ensemble(int argc, char **argv)
     o.run.helpers = &(bt_ensemble_helpers){.start = bt_jobs_start, .end = bt_jobs_end, .of = &jobs};
     o.run.job = bt_jobs_is_one();
     if (o.run.job) o.run.retry = false; // the call that started it has forgotten the failures, and records new ones
-    bt_study s;
+    bt_study s = {0};
     bt_errors err = {0};
-    bt_status status = bt_comm_agree(comm, bt_study_read(&s, o.file.path, &err));
+    bt_status status = bt_cmd_each_may_read(comm, o.file.path, &err);
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_read(&s, o.file.path, &err));
     if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&s, o.file.set, o.file.n_set, &err));
     if (status == BT_OK) status = bt_ensemble_run(comm, &s, &o.run, &err);
     bt_study_free(&s);

@@ -164,6 +164,16 @@ bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, b
     return BT_ERR_IO;
 }
 
+bt_status bt_cmd_each_may_read(const bt_comm *c, const char *path, bt_errors *err)
+{
+    struct stat s;
+    const bool pipe = c->size > 1 && stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
+    if (pipe)
+        bt_errors_add(err, "%s: is no file, and each of the %d ranks would read it; write it to a file first", path,
+                      c->size);
+    return bt_comm_agree(c, pipe ? BT_ERR_USAGE : BT_OK);
+}
+
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
 {
     const bool lost = fflush(stdout) != 0 || ferror(stdout);

@@ -6,6 +6,7 @@
 #include "base/fileio.h"
 #include "output/folder.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,7 +28,7 @@ static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
         return;
     }
     *colon = 0;
-    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 0, INT64_MAX);
+    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 1, INT64_MAX);
     run->dump_path = colon + 1;
 }
 
@@ -71,6 +72,15 @@ static const struct argp run_argp = {.options = run_options,
                                      .children = children,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
+/// A step that this call does not make has no contacts to write.
+static bt_status check_dump(const bt_run_options *run, const bt_case *c, bt_errors *err)
+{
+    const int64_t all = bt_case_steps(c), last = run->max_steps > 0 && run->max_steps < all ? run->max_steps : all;
+    if (run->dump_step <= last) return BT_OK;
+    bt_errors_add(err, "--dump-contacts: step %" PRId64 " is not made: the last one is %" PRId64, run->dump_step, last);
+    return BT_ERR_USAGE;
+}
+
 int bt_cmd_run(int argc, char **argv)
 {
     options o = {.run = {.dump_step = -1}};
@@ -82,9 +92,11 @@ int bt_cmd_run(int argc, char **argv)
     char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
     if (folder) o.run.dir = folder;
 
-    bt_case c;
+    bt_case c = {0};
     bt_errors err = {0};
-    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    bt_status status = bt_cmd_each_may_read(comm, o.file.path, &err);
+    if (status == BT_OK) status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK) status = check_dump(&o.run, &c, &err);
     if (status == BT_OK && comm->rank == 0) status = bt_folder_may_take(o.run.dir, o.force, &err);
     if (status == BT_OK && comm->rank == 0 && o.run.dump_path)
         status = bt_cmd_may_write(o.run.dump_path, o.file.path, false, o.force, &err);

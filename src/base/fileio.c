@@ -172,6 +172,8 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     }
     const int broken = got < 0 ? errno : 0;
     close(fd);
+    // A mark of the byte order, as spreadsheets put it before UTF-8, is none of the text.
+    if (n >= 3 && !memcmp(*text, "\xef\xbb\xbf", 3)) memmove(*text, *text + 3, n -= 3);
     (*text)[n] = 0;
     *size = n;
     if (broken) {

@@ -45,6 +45,8 @@ static void check_table(const bt_check *k, const char *key, const bt_table *t, c
                        end, need);
 }
 
+enum { TIDE_STEPS = 20 }; // a step takes the current of its middle: 1 - sinc(π/20) = 0.4 % of the mean over it
+
 void bt_case_check_environment(const bt_check *k)
 {
     const bt_case *c = k->c;
@@ -56,6 +58,12 @@ void bt_case_check_environment(const bt_check *k)
         bt_check_fault(k, "water.tide.minor",
                        "%g m/s is more than water.tide.major, %g m/s; swap them and turn the inclination by 90 deg",
                        c->water.tide.minor, c->water.tide.major);
+    if (c->water.tide.major > 0 && c->water.tide.period < TIDE_STEPS * c->run.dt && bt_check_sound(k, "run.dt") &&
+        bt_check_sound(k, "water.tide.period"))
+        bt_check_fault(k, "water.tide.period",
+                       "%g s are fewer than %d time steps of %g s, which cannot follow it; a tide has hours, as in "
+                       "12.42 h",
+                       c->water.tide.period, TIDE_STEPS, c->run.dt);
     check_table(k, "water.current_table", &c->water.table, current);
     check_table(k, "air.wind_table", &c->air.table, wind);
 }

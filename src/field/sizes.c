@@ -81,6 +81,8 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
     return BT_OK;
 }
 
+#define LEAST_SPREAD 1e-6 // a distribution narrower than this has numbers that no double holds: 1/spread²
+
 double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id)
 {
     bt_rng r = bt_rng_start(seed, BT_RNG_SIZE, id);
@@ -89,7 +91,7 @@ double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id)
         double q = bt_pow(s->max / s->min, -s->exponent), u = 1 - bt_rng_uniform(&r);
         return s->min * bt_pow(q + u * (1 - q), -1 / s->exponent);
     }
-    if (s->spread == 0) return s->mean;
+    if (s->spread < LEAST_SPREAD) return s->mean;
     for (;;) {
         double d;
         if (s->law == BT_SIZE_LOGNORMAL) {

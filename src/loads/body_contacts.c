@@ -20,26 +20,29 @@ typedef struct {
     int64_t n, cap;
 } contact_rows;
 
-/// Interior angle of body i at its vertex v, rad; NaN when there is no such vertex.
-static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
+/// Interior angle of the outline of body i, rad, where vertex v of its part stands; NaN when there is no such vertex.
+/// Parts have no corners of their own: a cut leads from one corner of the outline to another.
+static double interior_angle(const bt_bodies *b, bt_idx i, int part, uint32_t v)
 {
-    const double *o = b->outline + 2 * b->offset[i];
-    const uint32_t n = (uint32_t)(b->offset[i + 1] - b->offset[i]);
-    if (v == n) v = 0; // the end of the last edge
-    if (v > n) return NAN;
-    const double *at = o + 2 * v, *before = o + 2 * (v ? v - 1 : n - 1), *after = o + 2 * (v + 1 < n ? v + 1 : 0);
+    const bt_mark *mark = b->mark + b->offset[i] + part;
+    const uint32_t count = mark->count;
+    if (v > count) return NAN;
+    const int n = bt_body_corners(b, i), k = mark[v < count ? v : 0].corner; // v = count: the end of the last edge
+    const double *o = b->outline + 2 * b->offset[i], *at = o + 2 * k, *before = o + 2 * (k ? k - 1 : n - 1),
+                 *after = o + 2 * (k + 1 < n ? k + 1 : 0);
     const double px = at[0] - before[0], py = at[1] - before[1], qx = after[0] - at[0], qy = after[1] - at[1];
     return BT_PI - bt_atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
-/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that
-/// meet, the sharper.
-static double corner_of(const bt_bodies *b, const bt_contact *u, uint32_t feature)
+/// Interior angle of the corner that makes a contact point of a pair of parts: features as manifold.c numbers them. Of
+/// two corners that meet, the sharper.
+static double corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2], uint32_t feature)
 {
     if ((feature >> 20) == 0x7ffu)
-        return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
-    const bool reference_b = feature >> 31, of_reference = feature & 1u;
-    return interior_angle(b, reference_b == of_reference ? u->b : u->a, (feature & 0xfffffu) >> 1);
+        return bt_min(interior_angle(b, u->a, part[0], (feature >> 10) & 0x3ffu),
+                      interior_angle(b, u->b, part[1], feature & 0x3ffu));
+    const bool reference_b = feature >> 31, of_reference = feature & 1u, of_b = reference_b == of_reference;
+    return interior_angle(b, of_b ? u->b : u->a, part[of_b], (feature & 0xfffffu) >> 1);
 }
 
 /// Masses without the drag that the solver's contain: a collision is short against the step.
@@ -53,6 +56,7 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
 {
     const bt_bodies *b = &w->bodies;
     const bool is_b = u->b == towed;
+    const bt_pair *pair = &cell->search.pairs[u->pair];
     const bt_idx other = is_b ? u->a : u->b;
     const double sign = is_b ? 1 : -1, total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};
     const bt_inv ia = bare(b, u->a), ib = bare(b, u->b);
@@ -86,7 +90,7 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, cell->search.pairs[u->pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner = corner_of(b, u, pair->part, pair->feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];

@@ -275,6 +275,23 @@ static void step_at_pace(bt_world *w, bt_pace *p)
     bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
 }
 
+static void warn(const char *text, int64_t step)
+{
+    bt_errors warnings = {0};
+    bt_errors_add(&warnings, "warning: --dump-contacts: step %" PRId64 " %s; no file is written", step, text);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
+}
+
+static bt_status dump(const run *r, bt_errors *err)
+{
+    int64_t n = 0;
+    for (bt_idx k = 0; k < r->w->cells->n; k++) n += r->w->cells->cell[k].n_contacts;
+    if (n > 0) return bt_solver_dump(r->w, r->o->dump_path, err);
+    warn("has no contacts", r->w->step);
+    return BT_OK;
+}
+
 bt_status bt_running_step(bt_running *r, bt_errors *err)
 {
     bt_world *w = r->w;
@@ -282,7 +299,7 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     step_at_pace(w, &r->pace);
     add_phases(&r->totals.phases, &w->stats);
     const double t0 = bt_clock();
-    if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
+    if (w->step == r->o->dump_step) status = dump(r, err);
     bt_sample *const s = &r->sample;
     bt_observe(w, r->reference_speed, s);
     bt_stall_step(&r->totals.stall, w, s->ice_resistance, s->tow_force, r->roster.mean_size);
@@ -397,6 +414,7 @@ static bt_status finish(run *r, bt_errors *err)
         r->totals.stopped = stopped;
     }
     if (status == BT_OK && !r->o->quiet) bt_record_print_summary(r->record, &r->totals, err);
+    if (r->o->dump_step > r->w->step) warn("was not reached", r->o->dump_step);
     const bool sound = status == BT_OK;
     const bt_status closed = bt_record_close(r->record, sound ? &r->totals : NULL, sound ? &s : NULL, err);
     if (sound) status = closed;

@@ -6,6 +6,8 @@ import subprocess
 
 import pytest
 
+from harness import environment, launcher
+
 BERGTOW = os.path.abspath(os.environ.get("BERGTOW", "build/release/bergtow"))
 DONE, USAGE, CASE, IO = 0, 2, 3, 4
 
@@ -57,6 +59,9 @@ TEXTS = {
     "NaN": (GOOD + "tow: {speed: .nan}\n", 'bad.yml:5: tow.speed: ".nan" is not a number'),
     "infinity": (GOOD + "tow: {speed: .inf}\n", 'bad.yml:5: tow.speed: ".inf" is not a number'),
     "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
+    "underflow": (GOOD + "tow: {speed: 1e-400}\n", "bad.yml:5: tow.speed: 1e-400 is too small"),
+    "tide of seconds": (GOOD + "water: {tide: {major: 0.1, period: 1.9}}\n",
+                        "bad.yml:5: water.tide.period: 1.9 s are fewer than 20 time steps"),
     "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"),
                            "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
     "rafting that gives energy": (GOOD.replace("size: 1", "rafting: {kappa: 1.5}"),
@@ -284,6 +289,10 @@ USAGES = {
     "option without value": (["run", "good.yml", "-o"], "requires an argument"),
     "empty folder name": (["run", "good.yml", "-o", ""], "name of the folder is empty"),
     "dump without file": (["run", "good.yml", "--dump-contacts", "3"], "--dump-contacts 3: give STEP:FILE.h5"),
+    "dump of step 0": (["run", "good.yml", "--dump-contacts", "0:a.h5"], "give a whole number"),
+    "dump after the end": (["run", "good.yml", "--dump-contacts", "11:a.h5"], "step 11 is not made: the last one is 10"),
+    "dump after the last step": (["run", "good.yml", "--steps", "3", "--dump-contacts", "4:a.h5"],
+                                 "step 4 is not made: the last one is 3"),
     "dump of no step": (["run", "good.yml", "--dump-contacts", "x:a.h5"], "give a whole number"),
     "field without output": (["field", "good.yml"], "no output file given"),
 }
@@ -314,7 +323,33 @@ def test_set(folder, kind):
     refused(call("check", "good.yml", "--set", override, cwd=folder), CASE, fragment)
 
 
+def test_a_pipe_feeds_one_rank(folder):
+    words = [*launcher(2), BERGTOW, "run", "/dev/stdin", "--quiet"]
+    result = subprocess.run(words, cwd=folder, input=GOOD.encode(), capture_output=True, timeout=60,
+                            env=environment())
+    refused(result, USAGE, "/dev/stdin: is no file, and each of the 2 ranks would read it")
+
+
 # ---- what must work ----
+
+def test_the_mark_of_a_spreadsheet(folder):
+    """A mark of the byte order before the first letter, and the ends of lines that go with it."""
+    (folder / "marked.csv").write_text("t,u,v\r\n0,0.1,0\r\n9,0.2,0\r\n", encoding="utf-8-sig")
+    (folder / "marked.yml").write_text(GOOD + "water: {current_table: marked.csv}\n", encoding="utf-8-sig")
+    assert call("check", "marked.yml", cwd=folder).returncode == DONE
+
+
+def test_numbers_at_their_ends(folder):
+    """A spread so small that its square is none; numbers of 0 in all spellings."""
+    for word in ("ice.size_spread=1e-300", "ice.size_spread=0", "ice.size_spread=0.0e5", "ice.size_spread=-0"):
+        assert call("field", "good.yml", "-o", "field.h5", "--force", "--set", word, cwd=folder).returncode == DONE
+
+
+def test_a_step_without_contacts_is_no_failure(folder):
+    result = call("run", "good.yml", "--set", "ice.concentration=0", "--dump-contacts", "3:a.h5", "--quiet", cwd=folder)
+    assert result.returncode == DONE and b"step 3 has no contacts; no file is written" in result.stderr
+    assert not (folder / "a.h5").exists()
+
 
 
 @pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "),

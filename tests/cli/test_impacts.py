@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Collisions and panel loads that a run leaves: against its series, against each other, and against formulas written
 down again here."""
+import json
 import re
 import subprocess
 import sys
@@ -199,6 +200,22 @@ def test_crushing_and_its_keys(line, tmp_path):
         run(tmp_path, changed(LINE, ice__size=0.4, impact={"conversion": "crushing", "corner": "real"}),
             name="real"))["corner"]
     assert len(np.unique(real.round(6))) > 10 and np.all((real > 0.3) & (real < np.pi))
+
+
+def test_the_real_corner_of_a_floe_in_parts(tmp_path):
+    """A spike with a base of 4 m and 7.95 m and 8 m long: its angle is that of the outline, whatever the parts are."""
+    outline = [[30, -10], [40, -10], [40, 10], [30, 10], [30, 2], [22, 0.05], [30, -2], [30, -10]]
+    (tmp_path / "spike.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [{
+        "type": "Feature", "properties": {"thickness": 1}, "geometry": {"type": "Polygon", "coordinates": [outline]}}]}))
+    r = run(tmp_path, {
+        "run": {"dt": 0.1, "duration": 30},
+        "domain": {"frame": "basin", "length": 120, "width": 80, "x0": -20, "ends": "open", "sides": "open"},
+        "ice": {"outlines": "spike.geojson", "outlines_crs": "frame", "nonconvex": "split"},
+        "body": {"shape": "square", "length": 20, "draft": 5, "x": 0},
+        "tow": {"mode": "speed", "speed": 0.5, "ramp": 0},
+        "impact": {"conversion": "crushing", "corner": "real"}})
+    angle = np.arctan2(1.95, 8) + np.arctan2(2.05, 8)
+    np.testing.assert_allclose(rows(r)["corner"][0], angle, rtol=1e-6)
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):
