@@ -290,7 +290,7 @@ USAGES = {
     "empty folder name": (["run", "good.yml", "-o", ""], "name of the folder is empty"),
     "dump without file": (["run", "good.yml", "--dump-contacts", "3"], "--dump-contacts 3: give STEP:FILE.h5"),
     "dump of step 0": (["run", "good.yml", "--dump-contacts", "0:a.h5"], "give a whole number"),
-    "dump after the end": (["run", "good.yml", "--dump-contacts", "11:a.h5"], "step 11 is not made: the last one is 10"),
+    "dump after the end": (["run", "good.yml", "--dump-contacts", "11:a.h5"], "step 11 is not made: the last one is"),
     "dump after the last step": (["run", "good.yml", "--steps", "3", "--dump-contacts", "4:a.h5"],
                                  "step 4 is not made: the last one is 3"),
     "dump of no step": (["run", "good.yml", "--dump-contacts", "x:a.h5"], "give a whole number"),

@@ -206,7 +206,8 @@ def test_the_real_corner_of_a_floe_in_parts(tmp_path):
     """A spike with a base of 4 m and 7.95 m and 8 m long: its angle is that of the outline, whatever the parts are."""
     outline = [[30, -10], [40, -10], [40, 10], [30, 10], [30, 2], [22, 0.05], [30, -2], [30, -10]]
     (tmp_path / "spike.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [{
-        "type": "Feature", "properties": {"thickness": 1}, "geometry": {"type": "Polygon", "coordinates": [outline]}}]}))
+        "type": "Feature", "properties": {"thickness": 1},
+        "geometry": {"type": "Polygon", "coordinates": [outline]}}]}))
     r = run(tmp_path, {
         "run": {"dt": 0.1, "duration": 30},
         "domain": {"frame": "basin", "length": 120, "width": 80, "x0": -20, "ends": "open", "sides": "open"},
