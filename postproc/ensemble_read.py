@@ -188,15 +188,6 @@ class Ensemble:
         """True for a Latin hypercube, False for a grid."""
         return "sampling: latin-hypercube" in self.study.split("# base case")[0]
 
-    @cached_property
-    def tied(self):
-        """{key: [(of the condition, value as written)]} of the keys that go with one value of a parameter."""
-        out = {}
-        for where, texts in re.findall(r"^with (.+?): (.+)$", self.study.split("# base case")[0], re.M):
-            for key, value in re.findall(r"([a-z_.]+)=(.*?)(?=, [a-z_.]+=|$)", texts):
-                out.setdefault(key, []).append((where, value))
-        return out
-
     # ---- members
 
     def folder(self, m):
@@ -237,6 +228,12 @@ class Ensemble:
     def texts(self, m):
         """Warnings of a member in its own words; [] where its folder is not there."""
         return [str(w) for w in self._texts(m).get("warnings") or []]
+
+    def why_unsteady(self, m):
+        """The first reason that a member gives for its verdict, without numbers, so that those of others are the
+        same; remedies, too, are left out."""
+        reason = str((self._texts(m).get("window") or {}).get("reason") or "its result does not say why")
+        return re.split(r"[,:;]|(?: (?:at|by|for|of|from))? [-(\d]", re.sub(r"^[\d.]+ % of ", "", reason))[0]
 
     def events(self, m):
         """What happened in a member's run, as Run.events has it; None where its folder is not there. A result without

@@ -58,7 +58,7 @@ def means(s, markdown):
         "95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth "
         "of the fields at each end (from 8 fields on). "
         "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
-        "its correlation time. "
+        "its slowest cosine waves. "
         "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body "
         "stood still, N window not steady, S short window, X stopped early, O other warning."
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 import stat_load
 import text_table
+from ensemble_read import worded
 from text_table import hours_text, number, pair, quantity, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
@@ -82,17 +83,32 @@ def steps(s):
 
 def holds_for(s):
     """"Holds for: ...", what is the same for all conditions once, and of what is not, the conditions; "" of none."""
-    found = {c["label"]: c["design"]["holds_for"].split(", ") for c in s["conditions"] if c["design"]["holds_for"]}
-    if not found:
+    some = [c for c in s["conditions"] if c["design"]["holds_for"]]
+    if not some:
         return ""
-    parts = []
-    for texts in zip_longest(*found.values(), fillvalue=""):
-        where = {}
-        for label, text in zip(found, texts):
-            where.setdefault(text, []).append(label)
-        where.pop("", None)
-        parts += where if len(where) == 1 else [f"{text} ({several(labels)})" for text, labels in where.items()]
-    return f"Holds for: {', '.join(parts)}."
+    said = zip_longest(*(c["design"]["holds_for"].split(", ") for c in some), fillvalue="")
+    return f"Holds for: {', '.join(part for texts in said for part in qualified(shared(list(zip(some, texts)))))}."
+
+
+def shared(found):
+    """Each text of [(condition, text)] once: [(text, the conditions that it is of)], these "" where it is that of all;
+    without texts that are "". Where the texts differ by the value of one key alone, that value names the conditions."""
+    names, where = [c["label"] for c, _ in found], {}
+    for key in found[0][0]["values"] if found else ():
+        of = {}
+        for c, text in found:
+            of.setdefault(c["values"][key], set()).add(text)
+        if len(of) > 1 and all(len(texts) == 1 for texts in of.values()):
+            names = [worded(key, c["values"][key], c["units"][key]) for c, _ in found]
+            break
+    for name, (_, text) in zip(names, found):
+        where.setdefault(text, {})[name] = None
+    return [(text, several(list(some)) if len(where) > 1 else "") for text, some in where.items() if text]
+
+
+def qualified(some):
+    """Texts of shared() with their conditions behind them."""
+    return [f"{text} ({where})" if where else text for text, where in some]
 
 
 def warnings(s):

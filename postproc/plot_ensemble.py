@@ -17,13 +17,12 @@ from pathlib import Path
 
 import command
 import loads
-import plot_resistance
 import plot_variants
 import stat_extreme
 import stat_mean
 import style
 from bergtow_read import RunError
-from ensemble import add_load_options, extremes, member, nothing_to_count, sensitivity
+from ensemble import add_load_options, extremes, member, nothing_to_count, sample, sensitivity
 from ensemble_read import DOUBTS, Ensemble, reading, short_key, worded
 
 import matplotlib.pyplot as plt
@@ -214,15 +213,22 @@ def draw_speed(axes, e, some, key, factor):
                   color=style.FAINT)
 
 
-def estimate_point(e, c):
-    """A member of the condition as plot_resistance reads it, or None where its folder is not there."""
-    for m in c.finished:
-        if (e.folder(m) / "summary.json").exists():
-            try:
-                return plot_resistance.read(e.folder(m))
-            except RunError:
-                continue
-    return None
+def draw_estimates(axes, e, some, key, factor):
+    """The estimates of each condition, at the speed that its fields made good, as the mean of its fields; dotted where
+    they are not meant for it. A curve for one speed would be wrong of tows that are slower in more ice."""
+    x, k = np.array([c.values[key] for c in some]), 0
+    for name, estimate in e.estimates.items():
+        force, valid = (np.array([e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[c.finished].mean()
+                                  for c in some]) for what in ("force_n", "valid"))
+        force = np.where(force > 0, force, np.nan) / factor
+        if estimate["on_top"]:
+            axes.plot(x, force, color=style.FAINT, linewidth=1, dashes=(6, 3),
+                      label=f"{estimate['label']} (comes on top)")
+            continue
+        colour, k = style.ESTIMATES[k % len(style.ESTIMATES)], k + 1
+        axes.plot(x, np.where(valid == 1, force, np.nan), "d-", color=colour, linewidth=1.6, markersize=4,
+                  label=estimate["label"])
+        axes.plot(x, force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=estimate["label"])
 
 
 def draw_sweep(e, key):
@@ -247,9 +253,7 @@ def draw_sweep(e, key):
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
         if key == "ice.concentration":
-            point = estimate_point(e, some[len(some) // 2])
-            if point:
-                plot_resistance.draw_estimates(axes, [point], factor)
+            draw_estimates(axes, e, some, key, factor)
         elif key == "tow.speed":
             draw_speed(axes, e, some, key, factor)
         axes.set_title(words, fontsize=10)
@@ -263,7 +267,7 @@ def draw_sweep(e, key):
     if not log_x:
         style.times(grid.flat[0].xaxis, reading(key, e.units[key])[0])
         margin = 0.06 * (values.max() - values.min())
-        grid.flat[0].set_xlim(max(0.0,
+        grid.flat[0].set_xlim(max(0.0 if values.min() >= 0 else -np.inf,
                                   values.min() - margin),
                               min(1.0,
                                   values.max() + margin) if key == "ice.concentration" else values.max() + margin)
@@ -283,7 +287,8 @@ def draw_sweep(e, key):
     pairs = fields_legend(jammed(e)) + [(handle, label) for label, handle in extra.items()]
     note = " ".join(
         ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
-        (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else []) +
+        (["Estimates at the speed made good, dotted outside the range they are meant for."]
+         if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
             stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
@@ -306,8 +311,8 @@ def draw_sweep(e, key):
 
 
 def draw_scatter(e, key):
-    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of equal number with 95
-    %."""
+    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of an equal number of
+    conditions with 95 %; of the means of conditions, whose fields are not independent (ensemble.sample)."""
     rows = e.used
     x, y = e.parameters[key][rows], of(e, rows)
     log_y = wants_log(y)
@@ -325,11 +330,13 @@ def draw_scatter(e, key):
               label="a member")
     if jam.any():
         axes.plot(x[jam], y[jam] / factor, "x", color=style.JAM, markersize=5, label="a member whose body stood still")
-    bins = np.array_split(np.argsort(x), min(8, len(x) // 8)) if len(x) >= 24 else []
+    drawn, means, _ = sample(e, dict(zip(rows.tolist(), y)))
+    at = drawn[key]
+    bins = np.array_split(np.argsort(at), min(8, len(at) // 8)) if len(at) >= 24 else []
     if bins:
-        centre = np.array([y[b].mean() for b in bins])
-        bars = np.abs(np.array([stat_mean.t_interval(y[b]) for b in bins]) - centre[:, None]).T
-        axes.errorbar([x[b].mean() for b in bins],
+        centre = np.array([means[b].mean() for b in bins])
+        bars = np.abs(np.array([stat_mean.t_interval(means[b]) for b in bins]) - centre[:, None]).T
+        axes.errorbar([at[b].mean() for b in bins],
                       centre / factor,
                       yerr=bars / factor,
                       fmt="s-",
@@ -337,8 +344,8 @@ def draw_scatter(e, key):
                       markersize=5,
                       capsize=3,
                       linewidth=1.2,
-                      label="mean of a bin, 95 % (t)")
-        axes.plot([x[b].mean() for b in bins], [np.median(y[b]) / factor for b in bins],
+                      label="mean of a bin of conditions, 95 % (t)")
+        axes.plot([at[b].mean() for b in bins], [np.median(means[b]) / factor for b in bins],
                   "_",
                   color=style.TOW,
                   markersize=14,

@@ -117,15 +117,15 @@ def draw_balance(axes, run, factor, unit):
     """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + ... + inertia.
 
     Which they are, and in which order, the file says. Beside the first two, the tow and the ice, a force is drawn where
-    it reaches a hundredth of the tow.
+    it reaches a hundredth of the tow, both as running means: a jam of one step would hide all others.
     """
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    names = run.by_role("balance", "force")
-    for k, name in enumerate(names):
-        mean = running_mean(run[name], samples)
-        if k > 1 and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run[names[0]]), initial=0):
+    means = {name: running_mean(run[name], samples) for name in run.by_role("balance", "force")}
+    largest = [np.nanmax(np.abs(mean), initial=0) for mean in means.values()]
+    for k, (name, mean) in enumerate(means.items()):
+        if k > 1 and largest[k] < 0.01 * largest[0]:
             continue
         colour, width, dashes = style.BALANCE[k] if k < len(style.BALANCE) else style.BALANCE[-1 - k % 3]
         line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=run.label(name))

@@ -127,9 +127,9 @@ def design_row(c):
             str(tow["fields"]), text_table.number(tow["hours"])]
 
 
-def answer(e, s, case, results):
-    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for; results:
-    those of other commands, as results_beside() has them."""
+def answer(e, s, cases, results):
+    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for. cases:
+    those of statement.cases(); results: those of other commands, as results_beside() has them."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
             "largest simulated", "in the start", "fields", "hours"]
@@ -153,7 +153,7 @@ def answer(e, s, case, results):
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(case, s) + report_method.beyond(results, e)}] if case else []
+             "rows": report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
     return out + [lines(held)] * bool(held)
 
 
@@ -345,29 +345,38 @@ def beside(results):
     return out
 
 
-def first_run(e):
-    """(values with their origin, the case as key: text, attributes) of the first member that can be read; Nones."""
-    for m in np.flatnonzero(e.status == FINISHED):
-        try:
-            with Run(e.folder(m)) as run:
-                return report_case.values(run), run.case, run.attributes
-        except RunError:
-            continue
-    return [], {}, {}
+def first_runs(e, s):
+    """[(condition of the statistics, its values with their origin, the case as key: text, attributes)] of the first
+    member of each condition that can be read."""
+    out = []
+    for c, of in zip(s["conditions"], e.conditions()):
+        for m in of.members[e.status[of.members] == FINISHED]:
+            try:
+                with Run(e.folder(m)) as run:
+                    out.append((c, report_case.values(run), run.case, run.attributes))
+                break
+            except RunError:
+                continue
+    return out
 
 
-def varied(e, values):
-    """The values; of those that differ between members, their range."""
+def varied(e, runs):
+    """Values of all conditions, those of first_runs(); of a parameter its range, of what else differs between
+    conditions, each value and each origin with its conditions."""
     words = {"ice.seed": "varied"}
     for key, some in e.parameters.items():
         if len(set(some.tolist())) > 1:
             factor, unit = reading(key, e.units[key])
             words[key] = "varied" if some.dtype == object else \
                 f"varied, {factor * np.nanmin(some):.4g} to {factor * np.nanmax(some):.4g} {unit}".strip()
-    for v in values:
-        if v.key in e.tied:
-            words[v.key] = "; ".join(dict.fromkeys([v.value, *(f"{value} at {c}" for c, value in e.tied[v.key])]))
-    return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
+    def together(some, text):
+        return "; ".join(loads_text.qualified(loads_text.shared([(c, text(v)) for (c, *_), v in zip(runs, some)])))
+    def of_all(some):
+        kinds = {v.kind for v in some}
+        return replace(some[0], value=words.get(some[0].key) or together(some, lambda v: report_case.short(v.value)),
+                       kind=some[0].kind if len(kinds) == 1 else "study",
+                       origin=together(some, lambda v: scrubbed(v.origin)))
+    return [of_all(some) for some in zip(*(values for _, values, *_ in runs))]
 
 
 def ranges(results):
@@ -395,22 +404,21 @@ def context(folder, place=None, given=None, also=()):
         print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
     rows, rows_of = provenance(e), members(e, s)
-    values, texts, attributes = first_run(e)
-    values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
-              for v in varied(e, values)]
-    case, results = statement.case_of(e, e.used), results_beside(e, also)
+    runs = first_runs(e, s)
+    values = [replace(v, value=scrubbed(v.value)) for v in varied(e, runs)]
+    cases, results = statement.cases(e, s), results_beside(e, also)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
-    block = report_case.title_block(texts, attributes, given or {})
+    block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
     warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
-        "answer": answer(e, s, case, results),
+        "answer": answer(e, s, cases, results),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],
-        "method": report_method.method(s, case), "limits": report_method.limits(case, statement.unbounded(e, e.used)),
+        "method": report_method.method(s, cases), "limits": report_method.limits(cases),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
-                    and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
+                    and not v.key.startswith(PERSONAL) and any(report_run.applies(v.key, r[2]) for r in runs)],
         "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
         "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,

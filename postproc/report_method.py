@@ -9,13 +9,11 @@ import loads_text
 import stat_alike
 import stat_extreme
 import stat_profile
+from bergtow_read import case_value
+from report_case import source_of_ice
 from text_table import number, quantity
 
-
-def _one(texts, key, what):
-    """"what: value" of a key where it has one."""
-    value = texts.get(key, "")
-    return f"{what} {value}" if value not in ("", "none") else ""
+KAPPA, PRESSURE = "ice.rafting.kappa", "ice.crushing.pressure"
 
 
 def _span(values, text=lambda v: f"{v:.3g}"):
@@ -23,19 +21,28 @@ def _span(values, text=lambda v: f"{v:.3g}"):
     return text(low) if low == high else f"{text(low)} to {text(high)}"
 
 
-def _amount(s):
+def _fields(s, cases):
+    """Of which ice the tows are, "" where some read it."""
+    if any(source_of_ice(case.texts) for _, case in cases):
+        return ""
+    seeds = {m["seed"] for m in s["members"]}
+    return ", each through an ice field of its own" if len(seeds) == len(s["members"]) else \
+        f", whose ice is made from {len(seeds)} seeds, the same in all conditions"
+
+
+def _amount(s, cases):
     """What was simulated, in a sentence."""
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     n = sum(c["members"]["used"] for c in s["conditions"])
-    said = f"{n} tows in {len(s['conditions'])} conditions, each through an ice field of its own"
+    said = f"{n} tows in {len(s['conditions'])} conditions{_fields(s, cases)}"
     if tows:
         fields, hours = _span([d["fields"] for d in tows]), _span([d["hours"] for d in tows], number)
         said += f"; {fields} fields and {hours} hours of tow a condition, the start-up left out"
     return said + "."
 
 
-def method(s, case):
-    """Paragraphs. case: statement.Case or None."""
+def method(s, cases):
+    """Paragraphs. cases: those of statement.cases()."""
     out = [
         "Every floe is a rigid polygon that moves in the plane of the sea surface. Floes, the towed body and walls "
         "push each other by non-negative impulses with Coulomb friction, solved together in every time step (planar "
@@ -43,7 +50,7 @@ def method(s, case):
         "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
         "sum of these impulses over the time step. The tow force is the force along the tow: ice resistance, drag of "
         "water and air, Coriolis force, slope of the sea and inertia. A force across the tow is not in it.",
-        _amount(s)
+        _amount(s, cases)
     ]
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     if not tows:
@@ -68,41 +75,64 @@ def method(s, case):
     return out
 
 
-def limits(case, jams):
-    """Sentences on what the model leaves out, the gravest first. jams: are there rigid floes so dense that they jam?"""
-    out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
-           "forces were not validated."]
-    if case is None:
-        return out
-    texts = case.texts
+def _span_of(cases, key):
+    """"10", or "5 to 17": the values above zero that a key has in these cases."""
+    values = {case_value(case.texts, key, 0.0): case.texts.get(key, "") for _, case in cases}
+    return _span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
+
+
+def _ice(case, kappa, pressure):
+    """What floes do; kappa, pressure: of all cases, so that those of another value are no other sentence."""
     if case.rigid:
-        out.append("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
-                   + (", and here they are dense enough to jam." if jams else "."))
-    else:
-        rafts = texts.get("ice.rafting.kappa", "0") != "0"
-        crushes = not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ")
-        ways = [word for word in (
-            _one(texts, "ice.rafting.kappa", "they slide over each other (raft) above a load that grows with the "
-                 "square of their thickness, κ =") if rafts else "",
-            _one(texts, "ice.crushing.pressure", "their edges crush at") if crushes else "") if word]
-        never = ["break", "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)]
-        out.append(f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never[:-1])} or "
-                   f"{never[-1]}.")
-    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
-               "there are no waves.")
-    if texts.get("domain.ends") == "open" and texts.get("domain.sides") != "walls":
-        out.append("The ice is not confined along the tow: pressure in the pack by wind, current or a shore is not in "
-                   "the force.")
-    out.append({
+        return ("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
+                + (", and here they are dense enough to jam." if case.jams else "."))
+    rafts, crushes = (case_value(case.texts, key, 0.0) > 0 for key in (KAPPA, PRESSURE))
+    ways = [*["they slide over each other (raft) above a load that grows with the square of their thickness, κ = "
+              f"{kappa}"] * rafts, *[f"their edges crush at {pressure}"] * crushes]
+    never = ["break", "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)]
+    return f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never[:-1])} or {never[-1]}."
+
+
+def _pack(case):
+    return "" if case.texts.get("domain.ends") != "open" or case.texts.get("domain.sides") == "wall" else \
+        "The ice is not confined along the tow: pressure in the pack by wind, current or a shore is not in the force."
+
+
+def _end(case):
+    """What the towing end does."""
+    return {
         "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
                  "the tow force holds no dynamics of the line.",
         "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
         "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
-    }.get(case.mode, "Nothing is towed."))
-    if case.mode != "speed" and not np.isfinite(case.breaking_load):
-        out.append("No line parts: the case sets no breaking load.")
-    if not np.isfinite(case.bollard_pull):
-        out.append("No vessel is judged: the case names no bollard pull.")
+    }.get(case.mode, "Nothing is towed.")
+
+
+def _line(case):
+    return "" if case.mode == "speed" or np.isfinite(case.breaking_load) else \
+        "No line parts: the case sets no breaking load."
+
+
+def _vessel(case):
+    return "" if np.isfinite(case.bollard_pull) else "No vessel is judged: the case names no bollard pull."
+
+
+def limits(cases):
+    """Sentences on what the model leaves out, the gravest first; what is not so of all cases, with its conditions.
+    cases: those of statement.cases()."""
+    out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
+           "forces were not validated."]
+    if not cases:
+        return out
+    def of_each(say):
+        for text, where in loads_text.shared([(c, say(case)) for c, case in cases]):
+            yield f"For {where}: {text[0].lower()}{text[1:]}" if where else text
+    kappa, pressure = (_span_of(cases, key) for key in (KAPPA, PRESSURE))
+    out += of_each(lambda case: _ice(case, kappa, pressure))
+    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
+               "there are no waves.")
+    for say in (_pack, _end, _line, _vessel):
+        out += of_each(say)
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
     out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
@@ -112,25 +142,33 @@ def limits(case, jams):
     return out
 
 
-def holds(case, s):
-    """Rows (what, value) on the line and the vessel, for the answer."""
-    if case is None:
+def _breaking(case):
+    if np.isfinite(case.breaking_load):
+        return case.breaking_words
+    return "none in the case: the tension above has no safety factor" if case.mode != "speed" else \
+        "no line in the case: the tow force above is without dynamics of a line and without a safety factor"
+
+
+def _pull(case):
+    return quantity(case.bollard_pull, "N") if np.isfinite(case.bollard_pull) else \
+        "no vessel in the case: its net pull at the speed of the tow, after its own resistance in ice, must exceed " \
+        "the tow force"
+
+
+def holds(cases):
+    """Rows (what, value) on the line and the vessel, for the answer; cases: those of statement.cases()."""
+    if not cases:
         return []
-    speeds = sorted({str(c["values"]["tow.speed"]) for c in s["conditions"] if "tow.speed" in c["values"]})
-    rows = [("tow speed asked for", f"{', '.join(speeds)} m/s" if speeds else case.texts.get("tow.speed", "–"))]
-    made = [(c["label"], c["design"]["speed"]) for c in s["conditions"] if c["design"]["speed"]]
-    if made and case.mode in ("line", "thrust"):
-        rows.append(("speed made good", "; ".join(f"{label}: {number(v['value'])} m/s" + (
-            f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})"
-            if np.isfinite(v["interval_95"]).all() else "") for label, v in made)))
-    rows.append(("breaking load of the line", case.breaking_words
-                 if np.isfinite(case.breaking_load) else "none in the case: the tension above has no safety factor"
-                 if case.mode != "speed" else "no line in the case: the tow force above is without dynamics of a line "
-                 "and without a safety factor"))
-    rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
-                 if np.isfinite(case.bollard_pull) else "no vessel in the case: its net pull at the speed of the tow, "
-                 "after its own resistance in ice, must exceed the tow force"))
-    return rows
+    def row(what, say):
+        return what, "; ".join(loads_text.qualified(loads_text.shared([(c, say(case)) for c, case in cases])))
+    made = [(c["label"], c["design"]["speed"]) for c, case in cases
+            if c["design"]["speed"] and case.mode in ("line", "thrust")]
+    said = [f"{label}: {number(v['value'])} m/s" + (
+        f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})" if np.isfinite(v["interval_95"]).all()
+        else "") for label, v in made]
+    return [row("tow speed asked for", lambda case: case.texts.get("tow.speed", "–")),
+            *[("speed made good", "; ".join(said))] * bool(said),
+            row("breaking load of the line", _breaking), row("bollard pull of the vessel", _pull)]
 
 
 def _limit(found, c):

@@ -28,7 +28,7 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (ensemble_read.DOUBTS) that concern the value
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
-    "unsteady": "members whose loads still change within the window",
+    "unsteady": "members whose window is not steady",
     "short": "members with fewer than 20 independent samples", "stopped": "members that stopped early"
 }
 #: what stands in the line of what the values hold for: case key, words in front and behind
@@ -46,6 +46,7 @@ class Case:
     """What a statement has to know of a condition's case."""
 
     rigid: bool            #: nothing limits the force of a floe
+    jams: bool             #: its rigid floes are so dense that they jam
     mode: str
     breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that part
     bollard_pull: float    #: N, NaN without a vessel
@@ -85,12 +86,18 @@ def case_of(e, rows):
             with Run(e.folder(m)) as run:
                 limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
                 mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
-                return Case(not any(x > 0 for x in limits), mode, _breaking_loads(run, mode),
+                return Case(not any(x > 0 for x in limits), unbounded(e, rows), mode, _breaking_loads(run, mode),
                             pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
                             run.case | ice_as_read(run))
         except RunError:
             continue
     return None
+
+
+def cases(e, s):
+    """[(condition of the statistics s, its Case)] of the conditions whose case can be read."""
+    found = [(c, case_of(e, of.finished)) for c, of in zip(s["conditions"], e.conditions())]
+    return [(c, case) for c, case in found if case]
 
 
 def speed_made_good(e, rows):
@@ -113,6 +120,7 @@ def _numbers(e, name, rows):
 
 def unbounded(e, rows):
     """Is there a member whose rigid floes jam? Of an earlier program, which had no number for it, its warning says."""
+    rows = np.asarray(rows)
     known = _numbers(e, "domain_load_unbounded", rows)
     return bool(np.any(known == 1)) or any(
         text.startswith("ice.concentration:") for m in rows[np.isnan(known)] for text in e.texts(m))
@@ -132,7 +140,7 @@ def _of_the_case(e, rows, case, tow):
     out = []
     if case is None:
         out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
-    elif unbounded(e, rows):
+    elif case.jams:
         out.append(("rigid floes so dense that they jam: nothing in the model limits the force of a jam, so "
                     "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
                     f"{100 * np.nanmax(_numbers(e, 'concentration', rows), initial=0.0):.0f} %"))
@@ -155,9 +163,9 @@ def _of_the_sample(e, rows, c, load):
     """The same of how much was simulated, and of the tail."""
     out, d = [], load["design"]
     for kind, words in DOUBTFUL.items():
-        n = c["members"]["doubts"][kind]
-        if n:
-            out.append((words, f"{n} of {len(rows)} members"))
+        some = [words + (f", since {e.why_unsteady(m)}" if kind == "unsteady" else "")
+                for m in rows if kind in e.doubts(m)]
+        out += [(what, f"{some.count(what)} of {len(rows)} members") for what in dict.fromkeys(some)]
     if c["drift"]["verdict"] == "not steady":
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
     if load["fields"] < load["members"]:
@@ -308,7 +316,10 @@ def statement(e, rows, c):
                 if load["applies"].startswith(loads.LINE) and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
-    if tow is None:
+    if not len(rows):
+        counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
+        warned = [("nothing is known of a condition without a member that is in the numbers", ", ".join(counts))]
+    elif tow is None:
         left = c["loads_left_out"].get("tow_force")
         warned.append(("no tow force that varies", left["why"]) if left else
                       (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "

@@ -63,6 +63,9 @@ FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#
 #: floes by thickness: thin ice is grey-blue, thick ice is white, as from an aircraft
 THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
 
+#: by what a body is towed, in words, and by how much of it the speed made good may be another than the one ordered
+TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
+
 DPI = 150
 MANY = 20000  #: samples, or corners of floes, from which on a vector drawing holds them as a picture
 
@@ -96,9 +99,10 @@ def conditions(run):
             words.append(f"{np.mean(run.thickness):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")
-    mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
+    mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good
     if run.towed is not None and mode != "none" and np.isfinite(speed):
-        words.append(f"towed at {speed:.3g} m/s" + (" on a line" if mode == "line" else ""))
+        words.append(f"towed{TOWED_BY.get(mode, '')}, {speed:.3g} m/s ordered" +
+                     (f" and {made:.3g} m/s made good" if abs(made - speed) > SLOWER * abs(speed) else ""))
     if run.summary.get("stopped"):
         words.append("stopped early")
     return ", ".join(words)

@@ -77,7 +77,8 @@ enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
 
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
-    char *text;       ///< the file's text; with a base, those of all its files as YAML documents
+    char *text;       ///< the file's text; with a base, those of all its files as YAML documents; with overrides, a
+                      ///< last document {"set": {key: value}}
     char *floes_path; ///< file that lists the floes, where it is a base of this one, for messages; else NULL
     struct {
         char *title;

@@ -4,6 +4,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
+#include "base/json.h"
 #include "base/largest.h"
 #include "case/case_base.h"
 #include "case/schema.h"
@@ -254,6 +255,14 @@ static void read_floes(reader *r)
     }
 }
 
+/// "ice.size" of "ice.size = 3 m".
+static size_t key_length(const char *set)
+{
+    size_t n = strcspn(set, "=");
+    while (n && set[n - 1] == ' ') n--;
+    return n;
+}
+
 static void read_override(reader *r, const char *set, const char *place)
 {
     const char *equals = strchr(set, '=');
@@ -263,8 +272,7 @@ static void read_override(reader *r, const char *set, const char *place)
         return;
     }
     char name[96], where[256], why[BT_WHY], buffer[64];
-    size_t n = (size_t)(equals - set);
-    while (n && set[n - 1] == ' ') n--;
+    const size_t n = key_length(set);
     snprintf(name, sizeof name, "%.*s", n < 90 ? (int)n : 90, set);
     const char *value = equals + 1 + strspn(equals + 1, " ");
     bt_case_locate(r->c, &(bt_origin){.set = set, .place = place}, name, where);
@@ -304,6 +312,39 @@ static void begin_case(bt_case *c, const char *path)
     c->path = bt_text_copy(path);
 }
 
+/// Is the override the last one of its key, which holds?
+static bool holds(const char *const *overrides, int i, int n)
+{
+    const size_t own = key_length(overrides[i]);
+    for (int k = i + 1; k < n; k++)
+        if (key_length(overrides[k]) == own && !memcmp(overrides[i], overrides[k], own)) return false;
+    return strchr(overrides[i], '=');
+}
+
+/// The texts of the files, and behind them, as a document of its own, what was given in place of their values: who
+/// reads a result, also one that was resumed, tells from it which comment in the files is of the value that was run.
+static char *text_as_given(const bt_case_files *files, const char *const *overrides, int n)
+{
+    char *text = bt_case_files_text(files);
+    if (n == 0) return text;
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    bt_json_open(&j, "set", '{');
+    for (int i = 0; i < n; i++) {
+        if (!holds(overrides, i, n)) continue;
+        char *key = bt_text_of("%.*s", (int)key_length(overrides[i]), overrides[i]);
+        const char *value = strchr(overrides[i], '=') + 1;
+        bt_json_string(&j, key, value + strspn(value, " "));
+        free(key);
+    }
+    bt_json_close(&j, '}');
+    bt_json_close(&j, '}');
+    char *both = bt_text_of("%s\n--- # given beside the file\n%s", text, j.text);
+    bt_json_free(&j);
+    free(text);
+    return both;
+}
+
 /// The text of c into its values.
 static bt_status read_text(bt_case *c, size_t size, bool alone, const char *const *overrides,
                            const char *const *place, int n, bt_errors *err)
@@ -313,7 +354,7 @@ static bt_status read_text(bt_case *c, size_t size, bool alone, const char *cons
     bt_case_files files;
     bt_status status = bt_case_files_read(&files, c->path, c->text, size, alone, err);
     free(c->text);
-    c->text = bt_case_files_text(&files);
+    c->text = text_as_given(&files, overrides, n);
     if (status != BT_OK) {
         bt_case_files_free(&files);
         return status;

@@ -165,6 +165,30 @@ def test_fields_that_differ_are_found(process, fields, n, least):
     assert found_unlike(process, fields, n, 60) >= least
 
 
+def test_warnings_name_the_reason_of_the_verdict(tmp_path):
+    """Every verdict was said to be of loads that change; and of a condition whose members failed other reasons were
+    named."""
+    reasons = ("the last line parted at 603 s, and nothing tows the body since",
+               "the last line parted at 41.5 s, and nothing tows the body since; the tow force rises over the window "
+               "by 12 kN (95 %: 3 to 21), 30 % of its mean: run longer, or begin the window later",
+               "the tow force rises over the window by 12 kN (95 %: 3 to 21), 30 % of its mean: run longer",
+               "1.2 % of the steps in the window did not converge, more than the 1 % that a mean bears: raise it", None)
+    some = [made_up.member(np.arange(100.0) + k, {"ice.concentration": 0.5}, 0,
+                           window={"verdict": "not steady" if why else "steady", "reason": why})
+            for k, why in enumerate(reasons)]
+    some += [made_up.member(np.ones(100), {"ice.concentration": 0.9}, 1, status=made_up.FAILED, reason="exit code 5")
+             for _ in range(2)]
+    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
+                    "--time-scale", 10)
+    assert result.returncode == 0, result.stderr
+    warned = [line.removeprefix("WARNING: ") for line in result.stdout.splitlines() if line.startswith("WARNING")]
+    for words, n in (("the last line parted", 2), ("the tow force rises over the window", 1),
+                     ("the steps in the window did not converge", 1)):
+        assert f"Members whose window is not steady, since {words}: concentration 50 % ({n} of 5 members)." in warned
+    assert [w for w in warned if "concentration 90 %" in w] == [
+        "Nothing is known of a condition without a member that is in the numbers: concentration 90 % (2 failed)."]
+
+
 def test_where_fields_cannot_be_compared_nothing_is_said():
     """A single field, windows of less than two blocks; and a field of twice the length is alike in its first half."""
     some = fields_of(AR1(0.9), 8, 2000, np.random.default_rng(2))
@@ -190,8 +214,9 @@ def test_a_condition_whose_fields_differ_is_warned_of(tmp_path):
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     alike, unlike = (c["loads"]["tow_force"]["alike_p"] for c in s["conditions"])
     assert alike > 0.01 > unlike
-    assert "scatter of fields that are alike" in report_method.limits(statement_module.case_of(Ensemble(
-        tmp_path / "all"), [0]), False)[-1] and "fields that are alike" in " ".join(report_method.method(s, None))
+    cases = statement_module.cases(Ensemble(tmp_path / "all"), s)
+    assert "scatter of fields that are alike" in report_method.limits(cases)[-1]
+    assert "fields that are alike" in " ".join(report_method.method(s, cases))
 
 
 def test_rates_of_exceedance_of_a_known_process():

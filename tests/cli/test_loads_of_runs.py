@@ -116,7 +116,7 @@ def test_a_bridle_that_loses_a_branch_before_the_window(tmp_path):
     one, two = c["design"]["branches"]
     assert np.isnan(one["breaking_load"]) and two["breaking_load"] == 120 < two["largest_step"] < one["largest_step"]
     assert two["label"] == "tension of the second branch"
-    rows = dict(report_method.holds(statement.case_of(e, e.used), s))
+    rows = dict(report_method.holds(statement.cases(e, s)))
     assert rows["breaking load of the line"] == "120 N of branch 2"
 
 
@@ -145,5 +145,5 @@ def test_tables_pictures_and_answer_have_them(towed):
         speeds.append((px[some][0] - px[some][-1]) / (t[some][-1] - t[some][0]))  # towed to -x
     made = s["conditions"][0]["design"]["speed"]
     assert made["value"] == pytest.approx(np.mean(speeds), rel=1e-9) and made["interval_95"][0] < made["value"]
-    rows = dict(report_method.holds(statement.case_of(e, e.used), s))
+    rows = dict(report_method.holds(statement.cases(e, s)))
     assert rows["speed made good"].startswith(f"the case: {np.mean(speeds):.3f} m/s (")

@@ -318,6 +318,28 @@ def test_running_mean_is_the_mean_of_whole_windows():
     assert np.isclose(plot_force.running_mean(x, 11)[22], np.nanmean(x[17:28]), rtol=0, atol=1e-14)
 
 
+def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
+    """The order alone stood there, as "towed at", also of a body that stood still."""
+    def said(name, metres, mode="speed"):
+        with Run(make_run(tmp_path / name, path=((0.0, 0.0), (0.0, metres)), mode=mode)) as run:
+            return style.conditions(run)
+    assert said("a", 4.9).endswith("thick, towed, 0.5 m/s ordered")
+    assert said("b", 0.99, "line").endswith("towed on a line, 0.5 m/s ordered and 0.1 m/s made good")
+    assert "towed by a vessel, 0.5 m/s ordered and 0.05" in said("c", 0.5, "thrust")
+
+
+def test_a_jam_of_one_step_hides_no_force(tmp_path):
+    """A force is held against the running mean of the tow, not against its largest sample."""
+    folder = make_run(tmp_path / "run")
+    with h5py.File(folder / "result.h5", "r+") as f:
+        f["series/tow_force"][50], f["series/ice_resistance"][50] = 5000.0, 4998.0
+        f["series/inertia_force"][:], f["series/drag_force"][:] = 0.1, 20.0
+        f["series/tow_force"].attrs["order"] = 0
+    with Run(folder) as run:
+        labels = [line.get_label() for line in plot_force.draw(run).axes[1].lines]
+    assert "drag" in labels and "inertia" not in labels
+
+
 def test_force_figure_shows_mean_band_and_reference(tmp_path):
     with Run(make_run(tmp_path / "run")) as run:
         axes = plot_force.draw(run).axes[0]

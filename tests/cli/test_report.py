@@ -583,19 +583,48 @@ def test_the_marks_of_the_field_cases_are_read(words, kind):
 def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
     (tmp_path / "study.yml").write_text(
         "base: b.yml\nset:\n  ice.size: 2 m  # assumed: larger\n  run.dt: 0.2 s\nparameters: {ice.friction: [0.1, "
-        "0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\n"
+        "0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\nwith:\n  ice.friction=0.1:\n    ice.sides: 6  # a book\n"
     )
 
     class Member(Stated):
-        path = tmp_path / "members" / "c001-r001"
+        path, attributes = tmp_path / "members" / "c001-r001", {}
 
     values = {v.key: v for v in report_case.values(Member)}
     assert {k
             for k, v in values.items()
-            if v.origin.startswith("set by the study")} == {"ice.size", "run.dt", "ice.friction", "ice.thickness"}
+            if v.origin.startswith("set by the study")} == {"ice.size", "run.dt", "ice.friction", "ice.thickness",
+                                                            "ice.sides"}
     assert values["ice.size"].kind == "assumed" and values[
         "ice.size"].origin == "set by the study: assumed: larger" and values["run.dt"].kind == "study"
-    assert values["ice.length"].kind == "memory"
+    assert values["ice.length"].kind == "memory" and values["ice.sides"].origin == "set by the study: a book"
+    Member.case_text = GIVEN + '\n---\n{"set": {"ice.size": "2 m", "ice.friction": "0.2", "run.dt": "0.2 s"}}'
+    member = {v.key: v for v in report_case.values(Member)}  # neither its variant nor its `with` gives the others
+    assert {k for k, v in member.items() if v.origin.startswith("set by the study")} == {"ice.size", "run.dt",
+                                                                                        "ice.friction"}
+    assert member["ice.size"].kind == "assumed"
+
+
+def test_a_value_that_was_set_has_not_the_source_of_the_one_in_the_file(tmp_path):
+    """Nor after a resume, whose command line is another."""
+    (tmp_path / "a.yml").write_text("""\
+run: {dt: 0.1, duration: 0.4}
+domain: {length: 15, width: 8}
+ice:
+  concentration: 0.5
+  size: 0.7        # measured, Jones 2018
+  thickness: 0.04  # measured, Smith 2017
+body: {x: 3, length: 2, draft: 0.5}
+tow: {speed: 0.13, ramp: 0.1}
+""")
+    arguments = "--set", "ice.thickness=3 cm", "--set", "ice.thickness=5 cm", "--steps", 2
+    assert call("run", "a.yml", "-o", "r", *arguments, cwd=tmp_path).returncode == 0
+    for again in False, True:
+        if again:
+            assert call("resume", "r", cwd=tmp_path).returncode == 0
+        with Run(tmp_path / "r") as r:
+            assert '"ice.thickness": "5 cm"' in r.case_text and "3 cm" not in r.case_text
+            values = {v.key: (v.value, v.kind) for v in report_case.values(r)}
+        assert values["ice.thickness"] == ("0.05 m", "set") and values["ice.size"] == ("0.7 m", "source"), again
 
 
 def test_paper_has_every_key_with_its_meaning(tow, monkeypatch):
@@ -636,7 +665,7 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
         with Run(r.dir) as opened_run:
             values = report_case.values(opened_run)
             groups = report_run.key_values(opened_run, values)
-            members = SimpleNamespace(folder=lambda m: r.dir)
+            members = SimpleNamespace(folder=lambda m: r.dir, n=1, summary={}, texts=lambda m: [])
             said.append({k: statement.case_of(members, [0]).texts[k] for k in ("ice.size", "ice.thickness")})
         return r, {v.key: (v.value, v.kind) for v in groups["Ice"]}, {v.key: v for v in values}
 

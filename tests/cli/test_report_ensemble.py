@@ -14,11 +14,13 @@ import pytest
 
 import made_up_ensemble as made_up
 from browser import browser, complaints, opened
+from harness import TOW, call, changed, write_case
 from made_up_ensemble import FAILED, WAITING, member
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import ensemble  # noqa: E402
+import loads_text  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
 import report_ensemble  # noqa: E402
@@ -108,7 +110,7 @@ def test_the_answer_is_the_design_statement(tmp_path):
     e = Ensemble(made_up.write(tmp_path / "out", [
         member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
-    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None, {})
+    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, [], {})
     row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
     wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
     assert abs(newtons(row[1]) - d["value"]) <= max(0.06 * wide, 0.006 * d["value"])
@@ -116,14 +118,14 @@ def test_the_answer_is_the_design_statement(tmp_path):
     ends = row[2].removesuffix(" N").split(" to ")
     assert [float(v) for v in ends if v != "no bound"] == pytest.approx(
         [v for v in d["interval_95"] if np.isfinite(v)], abs=max(0.06 * wide, 0.006 * d["value"]))
-    assert row[-1] == "8.82" and "8.82 hours of tow" in report_method.method(s, None)[1]  # in one way everywhere
+    assert row[-1] == "8.82" and "8.82 hours of tow" in report_method.method(s, [])[1]  # in one way everywhere
     notes = " ".join(line for b in blocks if b["kind"] == "text" for line in b["lines"])
     assert [mark in notes for mark in report_ensemble.FOOTNOTES] == [mark in row[1] for mark in
                                                                      report_ensemble.FOOTNOTES]
     head = next(b for b in blocks if b["kind"] == "table")["head"]
     assert len(head) == len(row) and "in the start" not in head
     s["conditions"][0]["design"]["tow"]["start_up"] = {"largest": 1.01 * d["value"], "time_s": 30.0}
-    with_start = next(b for b in report_ensemble.answer(e, s, None, {}) if b["kind"] == "table")
+    with_start = next(b for b in report_ensemble.answer(e, s, [], {}) if b["kind"] == "table")
     started = dict(zip(with_start["head"], with_start["rows"][0]))
     assert newtons(started["in the start"]) == pytest.approx(1.01 * d["value"], rel=0.006)
     assert [started[name] for name in head] == row
@@ -308,6 +310,66 @@ def test_a_limit_that_is_not_resolved_is_not_stated_as_one():
         ["about 22.7 %; not resolved: 12 fields do not decide an end of the range"]
     assert said(makes_it=0.2, does_not=0.9, why="not monotonic: at 0.5 0 of 6 make it", doubt="of another case") == \
         ["between 20.0 % and 90.0 %; not resolved: not monotonic: at 0.5 0 of 6 make it (of another case)"]
+
+
+def test_what_differs_between_conditions_stands_with_them(tmp_path):
+    """Model, limits, line and keys of variants; and whose fields are the same. The first condition spoke for all."""
+    base = changed(TOW, run__duration=4, ice__concentration=0.3, output__window_start=2,
+                   domain={"length": 15, "width": 8, "ends": "open", "sides": "wall"},
+                   tow={"mode": "line", "speed": 0.13, "ramp": 1, "line_stiffness": 5e4, "line_damping": 1000})
+    write_case(tmp_path, base, "base.yml")
+    (tmp_path / "study.yml").write_text("""\
+base: base.yml
+fields: common
+repeats: 2
+variants:
+  rafting:
+    ice.rafting.kappa: 10  # Flato
+  more:
+    ice.rafting.kappa: 17
+  parts:
+    tow.line.breaking_load: 90 kN
+    tow.speed: 0.2 m/s
+""")
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
+    e = Ensemble(tmp_path / "out")
+    s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
+    cases = report_ensemble.statement.cases(e, s)
+    limits = report_method.limits(cases)
+    for said in ("For variant rafting; variant more: floes are rigid except that they slide over each other (raft) "
+                 "above a load that grows with the square of their thickness, κ = 10 to 17. They do not break, bend or "
+                 "crush.",
+                 "For variant parts: floes are rigid: they neither break, bend, crush nor raft, so nothing limits the "
+                 "force of a jam.", "For variant rafting; variant more: no line parts: the case sets no breaking load.",
+                 "The towing end of the line moves as prescribed: the vessel neither slows down nor stops."):
+        assert said in limits, said
+    assert not any("The ice is not confined" in text for text in limits)  # its sides are walls
+    rows = dict(report_method.holds(cases))
+    assert rows["tow speed asked for"] == "0.13 m/s (variant rafting; variant more); 0.2 m/s (variant parts)"
+    assert rows["breaking load of the line"] == \
+        "none in the case: the tension above has no safety factor (variant rafting; variant more); 90.0 kN (variant " \
+        "parts)"
+    assert "6 tows in 3 conditions, whose ice is made from 2 seeds, the same in all conditions" in \
+        report_method.method(s, cases)[1]
+    values = {v.key: v for v in report_ensemble.varied(e, report_ensemble.first_runs(e, s))}
+    assert values["ice.rafting.kappa"].value == "10 (variant rafting); 17 (variant more); 0 (variant parts)"
+    assert values["ice.rafting.kappa"].origin == ("set by the study: Flato (variant rafting); set by the study; no "
+                                                  "source stated (variant more); default, assumed (variant parts)")
+    assert values["tow.branch2.breaking_load"].value == "0 N (variant rafting; variant more); 90000 N (variant parts)"
+    assert values["ice.size"].value == "0.7 m" and values["ice.seed"].value == "varied"
+
+
+def test_the_value_that_tells_texts_apart_names_the_conditions():
+    def condition(a, b):
+        return {"label": f"{a}, {b}", "values": {"ice.concentration": a, "variant": b},
+                "units": {"ice.concentration": "1", "variant": ""}}
+    grid = [condition(a, b) for a in (0.2, 0.5) for b in "xyz"]
+    def said(*texts):
+        return loads_text.qualified(loads_text.shared(list(zip(grid, texts))))
+    assert said(*"pppppp") == ["p"] and said(*[""] * 6) == []
+    assert said(*"ppqppq") == ["p (variant x; variant y)", "q (variant z)"]
+    assert said("p", "p", "p", "", "", "") == ["p (concentration 20 %)"]
+    assert said(*"pqqqqq")[0] == "p (0.2, x)"
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):

@@ -376,6 +376,32 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
     matplotlib.pyplot.close("all")
 
 
+def test_estimates_are_those_of_each_condition(tmp_path):
+    """At the speed that it made good; a curve of one tow was 1.3 times the table's value where tows are slower."""
+    speeds = {0.3: 1.0, 0.6: 0.8, 0.85: 0.4}
+    some = [made_up.member(np.full(30, 100.0) + r, {"ice.concentration": a}, c,
+                           estimates={n: f * v * v for n, f in made_up.ESTIMATES.items()})
+            for c, (a, v) in enumerate(speeds.items()) for r in range(2)]
+    axes = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
+    factor = 1 if "(N)" in axes.get_ylabel() else 1000
+    drawn = {line.get_label(): line.get_data() for line in axes.lines if line.get_marker() == "d"}
+    x, force = drawn["Lichey-Hellmer"]
+    assert list(x) == list(speeds)
+    assert factor * force == pytest.approx([80 * v * v for v in speeds.values()])
+    assert np.isnan(drawn["compaction"][1]).all()  # not meant for these
+    dotted = next(line for line in axes.lines if line.get_label() == "compaction" and line.get_marker() != "d")
+    assert factor * dotted.get_ydata() == pytest.approx([5 * v * v for v in speeds.values()])
+    matplotlib.pyplot.close("all")
+
+
+def test_negative_values_are_in_the_picture(tmp_path):
+    some = [made_up.member(np.full(30, 100.0 + w + r), {"air.wind_x": w}, c)
+            for c, w in enumerate((-10.0, 0.0, 10.0)) for r in range(2)]
+    low, high = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "air.wind_x").axes[0].get_xlim()
+    assert low < -10 and high > 10
+    matplotlib.pyplot.close("all")
+
+
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
     result = script("plot_ensemble.py", plain[0], "-o", tmp_path)
@@ -396,6 +422,23 @@ def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
     ][-1] == "sensitivity"
     dots = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].lines[0]
     assert list(dots.get_xdata()) == [m["parameters"]["ice.thickness"] for m in members]
+    matplotlib.pyplot.close("all")
+
+
+def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
+    """The fields of a condition share what its values do: counted one by one they made the interval too short."""
+    rng = np.random.default_rng(3)
+    some = [made_up.member(np.full(30, level + 0.01 * r), {"ice.thickness": float(t)}, c)
+            for c, (t, level) in enumerate(zip(rng.random(24), rng.normal(100, 10, 24))) for r in range(6)]
+    e = Ensemble(made_up.write(tmp_path / "a", some, sampling="latin-hypercube"))
+    bars = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].containers[0]
+    at, centre = bars[0].get_data()
+    half = [(s[1, 1] - s[0, 1]) / 2 for s in bars[2][0].get_segments()]
+    conditions = sorted((c.values["ice.thickness"], plot_ensemble.of(e, c.finished).mean()) for c in e.conditions())
+    assert len(at) == 3
+    for k, one in enumerate(np.array_split(np.array(conditions), 3)):
+        low, high = stat_mean.t_interval(one[:, 1])
+        assert (at[k], centre[k], half[k]) == pytest.approx((*one.mean(axis=0), (high - low) / 2))
     matplotlib.pyplot.close("all")
 
 
