@@ -73,7 +73,7 @@ static const struct argp run_argp = {.options = run_options,
 
 int bt_cmd_run(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1}};
+    options o = {.run = {.dump_step = -1, .aloud = true}};
     char *command_line = bt_cmd_join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &o);

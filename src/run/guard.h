@@ -44,7 +44,7 @@
 
 typedef struct bt_guard {
     double overlap;         ///< m
-    double energy;          ///< J
+    double energy;          ///< J; state: forces of a program may do something else by the time of a checkpoint
     int64_t unconverged;
     bool escape_x, escape_y;///< there are walls, and they are looked at
     bool open_x, open_y;    ///< open edges
@@ -57,7 +57,8 @@ typedef struct bt_guard {
     double broken, gone;
 } bt_guard;
 
-/// Collective. Limits for the world of a case, all of whose bodies have been distributed.
+/// Collective. Limits for the world of a case, all of whose bodies have been distributed. g: zero, or what a checkpoint
+/// has of it.
 void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_floes, double mean_size);
 
 /// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors:
