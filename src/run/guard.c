@@ -99,7 +99,7 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
 {
     *g = (bt_guard){
         .overlap = c->guard.overlap * mean_size,
-        .energy = g->energy > 0 ? g->energy : c->guard.energy * driven_energy(c, w, n_floes),
+        .energy = c->guard.energy * driven_energy(c, w, n_floes),
         .unconverged = c->guard.unconverged,
         .escape_x = c->guard.escape && c->domain.ends == BT_BOUND_WALL,
         .escape_y = c->guard.escape && c->domain.sides == BT_BOUND_WALL,

@@ -57,8 +57,7 @@ typedef struct bt_guard {
     double broken, gone;
 } bt_guard;
 
-/// Collective. Limits for the world of a case, all of whose bodies have been distributed. g: zero, or what a checkpoint
-/// has of it.
+/// Collective. Limits for the world of a case, all of whose bodies have been distributed.
 void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_floes, double mean_size);
 
 /// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors:

@@ -189,7 +189,9 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
     r->end_step = r->until >= 0 ? r->until : r->o->max_steps > 0 && asked < whole ? asked : whole;
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
+    const double energy = r->guard.energy; // of the start, from a checkpoint
     bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
+    if (energy > 0) r->guard.energy = energy;
     bt_halt_begin(&r->halt);
     r->began = bt_clock();
     if (!fresh) return BT_OK;

@@ -123,25 +123,6 @@ with bergtow.Simulation.resume("later", forces=dict(push=push), threads=1) as si
     assert result.returncode == CASE and "the run had push, which a program had added" in result.stderr
 
 
-def test_the_limit_of_energy_is_that_of_the_start(tmp_path):
-    """Red when a run that goes on takes it anew: from a force that does something else by then."""
-    script = tmp_path / "limit.py"
-    script.write_text(f"""
-import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
-import bergtow
-def early(bodies): bodies.force[:, 0] += 100 if bodies.time < 1 else 0
-case = {changed(SHORT, guard__energy=3)!r}
-with bergtow.Simulation(case, "out", forces=dict(early=early), threads=1) as sim:
-    sim.step(20)
-    sim.checkpoint()
-    sim.drop()
-with bergtow.Simulation.resume("out", forces=dict(early=early), threads=1) as sim:
-    sim.step(10**6)
-""")
-    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-
-
 def test_a_force_that_has_acted_is_named_and_wanted(tmp_path):
     """One on a floe alone, where every series of forces is 0 or NaN; none where a force of the process was silent."""
     script = tmp_path / "save.py"
