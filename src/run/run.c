@@ -60,7 +60,8 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
         bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir,
                       BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
     else if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "the state before that step was not made again: stopped meanwhile; `bergtow resume %s` meets it",
+        bt_errors_add(err,
+                      "the state before that step was not made again: stopped meanwhile; `bergtow resume %s` meets it",
                       o->dir);
     else
         for (size_t k = 0; k < unheard.n; k++)

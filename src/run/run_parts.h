@@ -94,7 +94,7 @@ bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
 
 /// Collective, after bt_running_end, with the folder still held. A step was not sound: the state before it, made again
 /// from the last checkpoint (or the one of o->from, or the start), goes to failure.h5. What has come of it goes to err;
-/// o->aloud: what is in err before is printed first. start: bt_clock when the call began, from which o->max_wall counts.
+/// o->aloud: what is in err before is printed first. start: bt_clock when the call began; o->max_wall counts from it.
 void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, double start,
                          bt_errors *err);
 

@@ -284,6 +284,6 @@ def test_a_base_case_that_one_rank_cannot_read(tmp_path):
     rank = f'[ "{RANK}" = 1 ] || unset LD_PRELOAD; exec "$0" "$@"'
     stale = f"export LD_PRELOAD={faults.CALLS} BT_CALLS=open,openat BT_CALLS_AT=1 BT_CALLS_WITH={errno.ESTALE}; "
     env = environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, BT_CALLS_UNDER=tmp_path / "base.yml")
-    result = faults.started([*launcher(2), "sh", "-c", stale + rank, BERGTOW, "ensemble", tmp_path / "study.yml", "-o", "all"],
-                            env, tmp_path)
+    words = [*launcher(2), "sh", "-c", stale + rank, BERGTOW, "ensemble", tmp_path / "study.yml", "-o", "all"]
+    result = faults.started(words, env, tmp_path)
     assert result.returncode == IO and "base.yml: cannot" in result.stderr and "Stale file" in result.stderr, result
