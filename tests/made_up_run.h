@@ -135,7 +135,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
 {
     const bt_record_bodies b = bodies();
     bt_record *r;
-    bt_status status = bt_record_open(&r, &bt_comm_alone, dir, c, &b, "bergtow run x.yml", err);
+    bt_status status = bt_record_open(&r, &bt_comm_alone, dir, c, &b, "bergtow run x.yml", NULL, err);
     if (status != BT_OK) return status;
     for (int i = 0; i < steps; i++) {
         const bt_sample s = sample(i);
@@ -143,8 +143,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
         if (frames && i % (steps / frames) == 0) record_frame(r, i / (steps / frames), err);
     }
     const bt_run_totals t = totals(steps);
-    if (print_summary) bt_record_print_summary(r, &t, err);
-    return bt_record_close(r, &t, NULL, err);
+    return bt_record_close(r, &t, NULL, print_summary, err);
 }
 
 static inline char *in_folder(const char *name)

@@ -27,6 +27,9 @@ typedef struct bt_run_options {
     /// or NULL
     volatile sig_atomic_t *stop_signal;
     bool leave_signals;       ///< catch no signal: they are the caller's
+    /// print what is wrong with a step (bt_errors_print) before the state before it is made again, which may take long;
+    /// errors then have what comes after
+    bool aloud;
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 

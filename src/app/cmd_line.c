@@ -179,7 +179,8 @@ int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
     if (lost)
         bt_errors_add(err,
-                      "standard output: cannot be written; give it a place with space, or use the files of the result");
+                      "standard output: cannot be written; give it a place with space, or a reader that stays to "
+                      "the end, or use the files of the result");
     if (lost && status == BT_OK) status = BT_ERR_IO;
     status = bt_comm_agree(c, status);
     bt_comm_errors(c, err);

@@ -73,7 +73,7 @@ static const struct argp resume_argp = {.options = resume_options,
 
 int bt_cmd_resume(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1}};
+    options o = {.run = {.dump_step = -1, .aloud = true}};
     char *command_line = bt_cmd_join(argc, argv);
     bt_cmd_parse(&resume_argp, argc, argv, &o);
     const bt_comm *comm = bt_comm_world();

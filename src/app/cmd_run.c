@@ -83,7 +83,7 @@ static bt_status check_dump(const bt_run_options *run, const bt_case *c, bt_erro
 
 int bt_cmd_run(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1}};
+    options o = {.run = {.dump_step = -1, .aloud = true}};
     char *command_line = bt_cmd_join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &o);

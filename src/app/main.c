@@ -126,6 +126,14 @@ static int list_of(const char *word)
     return -1;
 }
 
+// A reader of the output that ends, such as head or a terminal, must not take a run with it: the text is lost, and the
+// end says so. What only prints has no other work to do then.
+static int start(int command, int argc, char **argv)
+{
+    if (commands[command].parallel) signal(SIGPIPE, SIG_IGN);
+    return commands[command].run(argc, argv);
+}
+
 // Exit code of this rank.
 static int bergtow(int argc, char **argv)
 {
@@ -137,7 +145,7 @@ static int bergtow(int argc, char **argv)
     const char *word = argv[1];
     for (int i = 0; i < N_COMMANDS; i++)
         if (!strcmp(word, commands[i].name))
-            return first || commands[i].parallel ? commands[i].run(argc - 1, argv + 1) : BT_OK;
+            return first || commands[i].parallel ? start(i, argc - 1, argv + 1) : BT_OK;
     if (!first) return BT_OK; // what follows concerns the console
 
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"),

@@ -4,7 +4,8 @@
 // The promise. A run that is stopped, or killed, at any moment and taken up again ends with the state, the series, the
 // frames, the events, the collisions and the summary of the run that was never stopped, on any number of ranks and
 // threads. Only wall times, and the counts of what the division among ranks has cost, are those of the pieces. A run
-// that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given.
+// that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given,
+// unless a file that this names has changed (src/case/case_files.h).
 //
 // The file. DIR/checkpoint.h5 is an HDF5 file protected by a checksum (src/base/checksum.h), of named arrays
 // (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp, brought to the disk, the one
@@ -55,6 +56,8 @@
 //   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
 //                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
+//                     D the rest
+//   bt_guard          S in_a_row, energy
 //                     D the rest
 //   bt_domain         not state: which rank owns what affects no bit
 //   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: no counter

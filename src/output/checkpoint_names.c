@@ -164,6 +164,7 @@ static const row rows[] = {
     {"record/merged", "1", "series of the sample under way, each in its own unit", "series"},
     {"run/frames_due", "1", "frames that are due so far", "one"},
     {"run/unconverged_in_a_row", "1", "steps without convergence one after the other", "one"},
+    {"run/energy_limit", "J", "of the bodies, by guard.energy and what drives them at the start; 0 without", "one"},
     // of every step, and totals
     {"history/time", "s", "end of each step", "time"},
     {"history/ice", "N", "ice resistance of each step", "time"},

@@ -117,22 +117,32 @@ bt_status bt_record_write_text(const bt_record *r, const char *name, const char 
     return status;
 }
 
-/// A run that goes on takes only the summary away, which is of its end, and what was under way.
-static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
+bt_status bt_record_remove(const bt_record *r, const char *name, bt_errors *err)
+{
+    char *path = bt_file_join(r->dir, name);
+    const bt_status status = bt_file_remove(path, err);
+    free(path);
+    return status;
+}
+
+/// A run that goes on takes only away what was under way.
+static bt_status prepare_dir(const bt_record *r, const char *resolved, const char *digests, bool fresh, bt_errors *err)
 {
     bt_status status = bt_file_make_dir(r->dir, err);
-    if (fresh) return status == BT_OK ? bt_folder_replace(r->dir, resolved, err) : status;
-    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", BT_CHECKPOINT_FILE ".tmp"};
-    for (size_t k = 0; k < sizeof stale / sizeof *stale && status == BT_OK; k++) {
-        char *path = bt_file_join(r->dir, stale[k]);
-        status = bt_file_remove(path, err);
-        free(path);
+    if (status == BT_OK && fresh) {
+        char *text = bt_text_of("%s%s", resolved, digests ? digests : "");
+        status = bt_folder_replace(r->dir, text, err);
+        free(text);
+    } else if (status == BT_OK) {
+        status = bt_record_remove(r, BT_RESULT_FILE ".tmp", err);
+        if (status == BT_OK) status = bt_record_remove(r, BT_CHECKPOINT_FILE ".tmp", err);
     }
     return status;
 }
 
 static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c,
-                             const bt_record_bodies *b, const char *command_line, bool fresh, bt_errors *err)
+                             const bt_record_bodies *b, const char *command_line, const char *digests, bool fresh,
+                             bt_errors *err)
 {
     *out = NULL;
     bt_record *r = bt_alloc(1, sizeof *r);
@@ -153,8 +163,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
     bt_status status = comm->rank == 0 ? bt_summary_check_added(err) : BT_OK;
-    if (status == BT_OK && comm->rank == 0) status = prepare_dir(r, resolved, fresh, err);
-    const bool replaced = status == BT_OK && fresh && comm->rank == 0;
+    if (status == BT_OK && comm->rank == 0) status = prepare_dir(r, resolved, digests, fresh, err);
+    const bool prepared = status == BT_OK && comm->rank == 0;
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = bt_h5_create_shared(&r->h5, comm, path, err);
     if (status == BT_OK) {
@@ -178,7 +188,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
             close_file(r);
         }
     }
-    if (status != BT_OK && replaced) bt_folder_put_back(dir);
+    if (status != BT_OK && prepared && fresh) bt_folder_put_back(dir);
+    else if (status != BT_OK && prepared) unlink(path);
     free(resolved);
     free(path);
     if (status != BT_OK) {
@@ -190,15 +201,15 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
 }
 
 bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
-                         const bt_record_bodies *b, const char *command_line, bt_errors *err)
+                         const bt_record_bodies *b, const char *command_line, const char *digests, bt_errors *err)
 {
-    return open_record(r, comm, dir, c, b, command_line, true, err);
+    return open_record(r, comm, dir, c, b, command_line, digests, true, err);
 }
 
 bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
                            const bt_record_bodies *b, const char *command_line, bt_errors *err)
 {
-    return open_record(r, comm, dir, c, b, command_line, false, err);
+    return open_record(r, comm, dir, c, b, command_line, NULL, false, err);
 }
 
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err)
@@ -290,11 +301,9 @@ char *bt_record_xdmf(const bt_record *r)
                                    .time = f->times, .line = f->lines, .n_frames = f->n});
 }
 
-/// What is still on its way goes to the file, and the numbers of the whole run are made: once, on rank 0.
+/// What is still on its way goes to the file, and the numbers of the whole run are made: on rank 0.
 static void conclude(bt_record *r, const bt_run_totals *t)
 {
-    if (r->concluded) return;
-    r->concluded = true;
     if (r->n_merged > 0) end_entry(r);
     bt_impact_store_take_closed(&r->impacts);
     bt_record_flush(r);
@@ -325,7 +334,7 @@ static bt_status hand_in(const bt_record *r, bt_errors *err)
     return status;
 }
 
-bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bt_errors *err)
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bool table, bt_errors *err)
 {
     const bool first = r->comm->rank == 0;
     char *xdmf = first ? bt_record_xdmf(r) : NULL;
@@ -346,6 +355,7 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *las
     if (first && status == BT_OK && t) status = write_summary(r, t, err);
     if (first && status == BT_OK && t) bt_folder_settle(r->dir);
     status = bt_comm_agree(r->comm, status);
+    if (first && status == BT_OK && t && table) bt_summary_print(&r->summary, &r->history, r->c, t, r->n_floes);
     free(xdmf);
     record_free(r);
     return status;
@@ -360,11 +370,4 @@ void bt_record_abandon(bt_record *r)
     if (r->comm->rank == 0 && r->fresh) bt_folder_put_back(r->dir);
     free(part);
     record_free(r);
-}
-
-void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err)
-{
-    r->h5.err = err;
-    conclude(r, t);
-    bt_summary_print(&r->summary, &r->history, r->c, t, r->n_floes);
 }

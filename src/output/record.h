@@ -179,12 +179,13 @@ typedef struct bt_record bt_record;
 
 /// Collective. Open dir (made if missing), write case.resolved.yml and result.part.h5 with case, provenance and bodies;
 /// what an earlier run has left in dir is removed. result.h5 is there once it is complete, see bt_record_publish. c and
-/// comm must stay valid until the record is closed; b is copied.
+/// comm must stay valid until the record is closed; b is copied. digests: of the files that the case names
+/// (case/case_files.h), or NULL; they stand in case.resolved.yml.
 /// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
 bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
-                         const bt_record_bodies *b, const char *command_line, bt_errors *err);
+                         const bt_record_bodies *b, const char *command_line, const char *digests, bt_errors *err);
 
-/// Collective. The same for a run that goes on from a checkpoint in dir: nothing but its summary is removed. Then
+/// Collective. The same for a run that goes on from a checkpoint in dir, of which nothing is removed. Then
 /// bt_record_load.
 bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
                            const bt_record_bodies *b, const char *command_line, bt_errors *err);
@@ -200,8 +201,8 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, 
 bt_status bt_record_publish(bt_record *r, bt_errors *err);
 
 /// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from
-/// result.h5, which may hold more by now; events from e. After bt_record_reopen and bt_record_watch_impacts. Errors:
-/// BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
+/// result.h5, which may hold more by now; events from e. Then the summary is removed. After bt_record_reopen and
+/// bt_record_watch_impacts. Errors: BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
 bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e, bt_errors *err);
 
 /// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left
@@ -236,14 +237,11 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, c
 /// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t =
 /// NULL closes a run that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no
 /// summary. last: the checkpoint of the end, on rank 0 (others and without: NULL), written when the result stands and
-/// before the summary does: a folder with a summary lacks nothing.
-bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bt_errors *err);
+/// before the summary does: a folder with a summary lacks nothing. table: then print that of the end of the run
+/// (summary and phases) on stdout, on rank 0: a reader that is slow or gone holds up nothing.
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_snapshot *last, bool table, bt_errors *err);
 
 /// Collective. Close and free a record that is of no use, and remove result.part.h5.
 void bt_record_abandon(bt_record *r);
-
-/// Print the end-of-run table (summary and phases) on stdout. On rank 0, after the last sample and before the record is
-/// closed with the same t. What cannot be written or read back is in err, and is the status of bt_record_close.
-void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
 #endif

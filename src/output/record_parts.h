@@ -34,7 +34,6 @@ struct bt_record {
     bt_frames frames;
     bt_impact_store impacts;
     // of the end of the run
-    bool concluded;
     bt_summary summary;
     bt_impact_count count; ///< collisions over the window
 };
@@ -44,6 +43,9 @@ void bt_record_flush(bt_record *r);
 
 /// frames.xdmf for the frames there are; the caller frees it.
 char *bt_record_xdmf(const bt_record *r);
+
+/// A file of the folder goes, if it is there.
+bt_status bt_record_remove(const bt_record *r, const char *name, bt_errors *err);
 
 /// A text file of the folder.
 bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err);

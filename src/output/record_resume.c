@@ -277,6 +277,8 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     if (status == BT_OK) status = load_frames(r, &old, frames, err);
     bt_h5_end(&old);
     if (status == BT_OK && first) bt_record_flush(r);
+    if (status == BT_OK) status = r->h5.status;
+    if (status == BT_OK && first) status = bt_record_remove(r, "summary.json", err); // of an end that is none any more
     free(path);
-    return bt_comm_agree(r->comm, status == BT_OK ? r->h5.status : status);
+    return bt_comm_agree(r->comm, status);
 }

@@ -19,6 +19,7 @@
 #include "run/ensemble_journal.h"
 #include "run/ensemble_list.h"
 #include "run/ensemble_member.h"
+#include "run/halt.h"
 #include "run/study_axes.h"
 #include "base/fileio.h"
 #include "base/launcher.h"
@@ -33,8 +34,6 @@
 // A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
 static volatile sig_atomic_t stop_signal;
 static void on_signal(int number) { stop_signal = number; }
-static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
-enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
 /// A process that is killed between the end of a member and the line for it leaves that line out: here it is added. By
 /// one process at a time, with the lock of the folder.
@@ -265,12 +264,12 @@ static bool wait_for_others(bt_ensemble *e, bool reported)
     return true;
 }
 
-/// As for a run of the base case. *open: nobody has asked for a number.
+/// Collective. As for a run of the base case. *open: nobody has asked for a number.
 static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads,
                                 bool *open, bt_errors *err)
 {
     bt_case c;
-    const bt_status status = bt_study_base_case(s, &c, err);
+    const bt_status status = bt_comm_agree(comm, bt_study_base_case(s, &c, err));
     if (status == BT_OK) {
         *threads = bt_run_threads(comm, &c, o->threads);
         *open = o->threads == 0 && c.run.threads == 0 && !getenv("OMP_NUM_THREADS");
@@ -359,10 +358,9 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     }
     if (comm->rank == 0 && !o->job) warn_fixed(&e);
     if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
-    struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
-    sigemptyset(&act.sa_mask);
+    struct sigaction before[BT_N_CAUGHT];
     stop_signal = 0;
-    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
+    bt_halt_catch(on_signal, NULL, before);
     const bool helped = e.jobs > 1;
     if (helped) o->helpers->start(o->helpers->of, e.jobs - 1, e.threads);
     bool others = false;
@@ -373,7 +371,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         others = status == BT_OK && !o->leave && o->max_steps == 0 && wait_for_others(&e, others);
     } while (others);
     if (helped) o->helpers->end(o->helpers->of, status == BT_ERR_SIGNAL);
-    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
+    bt_halt_let_go(before);
     if (e.alone >= 0) close(e.alone);
     bt_ensemble_share_records(&e);
     if (comm->rank == 0) {

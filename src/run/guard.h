@@ -44,7 +44,7 @@
 
 typedef struct bt_guard {
     double overlap;         ///< m
-    double energy;          ///< J
+    double energy;          ///< J; state: forces of a program may do something else by the time of a checkpoint
     int64_t unconverged;
     bool escape_x, escape_y;///< there are walls, and they are looked at
     bool open_x, open_y;    ///< open edges

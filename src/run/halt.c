@@ -20,28 +20,37 @@ static volatile sig_atomic_t stop_signal, save_signal;
 static void on_stop(int number) { stop_signal = number; }
 static void on_save(int number) { save_signal = number; }
 
-static const struct {
-    int number;
-    void (*handler)(int);
-} caught[BT_N_CAUGHT] = {{SIGINT, on_stop}, {SIGTERM, on_stop}, {SIGUSR2, on_stop}, {SIGUSR1, on_save}};
+static const int caught[BT_N_CAUGHT] = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGUSR1};
+
+void bt_halt_catch(void (*stop)(int), void (*save)(int), struct sigaction before[BT_N_CAUGHT])
+{
+    for (int k = 0; k < BT_N_CAUGHT; k++) {
+        // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
+        struct sigaction act = {.sa_handler = caught[k] == SIGUSR1 ? save : stop, .sa_flags = SA_RESTART};
+        sigemptyset(&act.sa_mask);
+        sigaction(caught[k], NULL, &before[k]);
+        const bool outlives_session = caught[k] == SIGHUP && before[k].sa_handler == SIG_IGN; // nohup
+        if (act.sa_handler && !outlives_session) sigaction(caught[k], &act, NULL);
+    }
+}
+
+void bt_halt_let_go(const struct sigaction before[BT_N_CAUGHT])
+{
+    for (int k = 0; k < BT_N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
+}
 
 void bt_halt_begin(bt_halt *h)
 {
     stop_signal = save_signal = 0;
     h->last = bt_clock();
     h->looked = 0;
-    for (int k = 0; k < BT_N_CAUGHT && !h->deaf; k++) {
-        // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
-        struct sigaction act = {.sa_handler = caught[k].handler, .sa_flags = SA_RESTART};
-        sigemptyset(&act.sa_mask);
-        sigaction(caught[k].number, &act, &h->before[k]);
-    }
+    if (!h->deaf) bt_halt_catch(on_stop, on_save, h->before);
 }
 
 void bt_halt_end(bt_halt *h)
 {
     if (h->stop_signal && stop_signal) *h->stop_signal = stop_signal;
-    for (int k = 0; k < BT_N_CAUGHT && !h->deaf; k++) sigaction(caught[k].number, &h->before[k], NULL);
+    if (!h->deaf) bt_halt_let_go(h->before);
 }
 
 uint64_t bt_halt_look(bt_halt *h, int64_t step)
@@ -83,6 +92,6 @@ void bt_halt_block(sigset_t *before)
 {
     sigset_t block;
     sigemptyset(&block);
-    for (int k = 0; k < BT_N_CAUGHT; k++) sigaddset(&block, caught[k].number);
+    for (int k = 0; k < BT_N_CAUGHT; k++) sigaddset(&block, caught[k]);
     pthread_sigmask(SIG_BLOCK, &block, before);
 }

@@ -3,6 +3,7 @@
 //
 //     SIGINT, SIGTERM, SIGUSR2   checkpoint and stop      (mpirun hands on SIGUSR1 and SIGUSR2; at the others it kills
 //     the ranks a second later)
+//     SIGHUP                     the same: the session has ended; under nohup, which ignores it, the run goes on
 //     SIGUSR1                    checkpoint and go on
 //     DIR/stop                   checkpoint and stop; the file is removed
 //     --max-wall                 the same after that time
@@ -17,7 +18,7 @@
 
 #include "bergtow/base.h"
 
-enum { BT_N_CAUGHT = 4 };
+enum { BT_N_CAUGHT = 5 };
 
 typedef struct bt_halt {
     int64_t steps;          ///< between checkpoints, 0 = none
@@ -47,6 +48,11 @@ void bt_halt_saved(bt_halt *h);
 
 /// Why the run stops after this step, in words; removes the stop file (rank 0).
 void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96]);
+
+/// Catch the signals that ask for a stop, and the one that asks for a checkpoint (NULL: not that one); before: for
+/// bt_halt_let_go.
+void bt_halt_catch(void (*on_stop)(int), void (*on_save)(int), struct sigaction before[BT_N_CAUGHT]);
+void bt_halt_let_go(const struct sigaction before[BT_N_CAUGHT]);
 
 /// Start threads that leave these signals to the main thread: block them, and set *before for pthread_sigmask.
 void bt_halt_block(sigset_t *before);

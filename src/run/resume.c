@@ -7,6 +7,7 @@
 
 #include "base/fileio.h"
 #include "base/lock.h"
+#include "case/case_files.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"
 #include "revision.h"
@@ -47,11 +48,16 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
     return status;
 }
 
-/// Collective. The case that the run began with, at time zero.
+/// Collective. The case that the run began with, at time zero, and the files that it names.
 static bt_status start_again(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
 {
     char *path = bt_file_join(o->dir, "case.resolved.yml");
-    const bt_status status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
+    bt_errors warnings = {0};
+    bt_status status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
+    if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&k->c, o->dir, &warnings, err);
+    status = bt_comm_agree(comm, status);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
     if (status == BT_OK && comm->rank == 0 && !o->quiet)
         printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
     free(path);

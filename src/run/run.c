@@ -23,9 +23,19 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     return status;
 }
 
-void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step,
+/// Collective. A call that is ended before its time, by a limit of its job or by hand, has said what it knew.
+static void tell(const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+{
+    if (!o->aloud) return;
+    bt_comm_errors(comm, err);
+    bt_errors_print(err);
+    bt_errors_free(err);
+}
+
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, double start,
                          bt_errors *err)
 {
+    tell(comm, o, err);
     bt_run_options quiet = *o;
     quiet.quiet = true;
     quiet.dump_step = -1;
@@ -39,14 +49,20 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
     bt_comm_bcast(comm, &from, sizeof from);
     if (from) bt_snapshot_share(comm, &s);
     s.err = &unheard;
-    bt_run_manner m = {.kept = from ? &s : NULL, .start = bt_clock(), .until = step - 1, .held = true};
+    const int64_t again = step - 1 - (from ? bt_snapshot_int(&s, "world/step") : 0);
+    if (again > 0 && o->aloud)
+        bt_errors_add(err, "the %" PRId64 " steps up to the state before that one are made again", again);
+    tell(comm, o, err);
+    bt_run_manner m = {.kept = from ? &s : NULL, .start = start, .until = step - 1, .held = true};
     int64_t failed;
     const bt_status status = run_case(comm, c, &quiet, &m, &failed, &unheard);
     if (status == BT_OK)
         bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir,
                       BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
     else if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "the state before that step was not made again: stopped meanwhile");
+        bt_errors_add(err,
+                      "the state before that step was not made again: stopped meanwhile; `bergtow resume %s` meets it",
+                      o->dir);
     else
         for (size_t k = 0; k < unheard.n; k++)
             bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
@@ -63,7 +79,7 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run
     bt_run_manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     int64_t failed;
     const bt_status status = run_case(comm, c, o, &m, &failed, err);
-    if (failed >= 0) bt_run_keep_failure(comm, c, o, failed, err);
+    if (failed >= 0) bt_run_keep_failure(comm, c, o, failed, start, err);
     if (status != BT_OK && m.lock >= 0 && bt_folder_keeps(o->dir))
         bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", o->dir, o->dir,
                       BT_FOLDER_REPLACED);

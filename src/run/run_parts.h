@@ -20,6 +20,7 @@ typedef struct bt_running {
     const bt_case *c;
     const bt_run_options *o;
     bt_world *w;
+    char *digests;           ///< of the files that the case names (case/case_files.h); on rank 0 of a fresh run
     bt_field field;          ///< at time zero, with the lead in it; on rank 0, for the checkpoints
     bt_roster roster;
     bt_record *record;       ///< NULL: the run leaves no files
@@ -92,8 +93,10 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
 bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
 
 /// Collective, after bt_running_end, with the folder still held. A step was not sound: the state before it, made again
-/// from the last checkpoint (or the one of o->from, or the start), goes to failure.h5. What has come of it goes to err.
-void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, bt_errors *err);
+/// from the last checkpoint (or the one of o->from, or the start), goes to failure.h5. What has come of it goes to err;
+/// o->aloud: what is in err before is printed first. start: bt_clock when the call began; o->max_wall counts from it.
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, double start,
+                         bt_errors *err);
 
 // --- going on --------------------------------------------------------------------------------------------------------
 

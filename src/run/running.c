@@ -25,6 +25,7 @@
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_check.h"
+#include "case/case_files.h"
 #include "case/cost.h"
 #include "partition/domain.h"
 #include "base/cores.h"
@@ -63,7 +64,8 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     // steps that are made again leave the result that they belong to
     const bool again = kept || r->until >= 0;
     status =
-        (again ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
+        again ? bt_record_reopen(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err)
+              : bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, r->digests, err);
     bt_gather_free(&b);
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
@@ -187,7 +189,9 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
     r->end_step = r->until >= 0 ? r->until : r->o->max_steps > 0 && asked < whole ? asked : whole;
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
+    const double energy = r->guard.energy; // of the start, from a checkpoint
     bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
+    if (energy > 0) r->guard.energy = energy;
     bt_halt_begin(&r->halt);
     r->began = bt_clock();
     if (!fresh) return BT_OK;
@@ -209,6 +213,8 @@ bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c,
                         .first = comm->rank == 0,
                         .started = m->start};
     r->until = m->until;
+    // before the field is made, which may take long: of what has been read
+    if (r->halt.first && o->dir && !m->kept) r->digests = bt_case_digests(c);
     bt_status status = set_up(r, m->kept, err);
     // Only now: a case that is refused leaves nothing behind.
     if (status == BT_OK && o->dir && !m->held) status = take_folder(comm, o->dir, &m->lock, err);
@@ -400,6 +406,8 @@ static bt_status look_last(run *r, bt_errors *err)
     return status;
 }
 
+static bool ends_early(const run *r) { return bt_halt_stops(r->asked) && r->w->step < r->end_step; }
+
 /// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order.
 static bt_status finish(run *r, bt_errors *err)
 {
@@ -409,14 +417,14 @@ static bt_status finish(run *r, bt_errors *err)
     r->totals.wall_time += bt_clock() - r->began;
     total_up(r);
     if (status == BT_OK) status = look_last(r, err);
-    if (bt_halt_stops(r->asked) && r->w->step < r->end_step) {
+    if (ends_early(r)) {
         bt_halt_describe(&r->halt, r->asked, r->w->step, stopped);
         r->totals.stopped = stopped;
     }
-    if (status == BT_OK && !r->o->quiet) bt_record_print_summary(r->record, &r->totals, err);
     if (r->o->dump_step > r->w->step) warn("was not reached", r->o->dump_step);
     const bool sound = status == BT_OK;
-    const bt_status closed = bt_record_close(r->record, sound ? &r->totals : NULL, sound ? &s : NULL, err);
+    const bt_status closed =
+        bt_record_close(r->record, sound ? &r->totals : NULL, sound ? &s : NULL, !r->o->quiet, err);
     if (sound) status = closed;
     bt_snapshot_free(&s);
     status = bt_comm_agree(r->comm, status);
@@ -433,13 +441,13 @@ static bt_status close_steps(run *r, bt_status status, bt_errors *err)
 {
     bt_progress_end(&r->progress);
     if (status == BT_OK && r->until >= 0) {
-        status = bt_halt_stops(r->asked) ? BT_ERR_SIGNAL : bt_running_checkpoint(r, BT_FAILURE_FILE, err);
+        status = ends_early(r) ? BT_ERR_SIGNAL : bt_running_checkpoint(r, BT_FAILURE_FILE, err);
         bt_record_abandon(r->record);
     } else if (status == BT_OK) {
         status = r->record ? finish(r, err) : look_last(r, err);
     } else if (r->record) {
         bt_errors more = {0}; // after a failed write another one says nothing new
-        bt_record_close(r->record, NULL, NULL, status == BT_ERR_IO ? &more : err);
+        bt_record_close(r->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
         bt_errors_free(&more);
     }
     if (status == BT_ERR_NUMERIC && r->w->step > r->first_step) r->failed = r->w->step;
@@ -466,5 +474,6 @@ bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
     bt_field_free(&r->field);
     bt_roster_free(&r->roster);
     bt_world_free(r->w);
+    free(r->digests);
     return status;
 }

@@ -210,7 +210,7 @@ static bt_status close_parts(bt_simulation *s, bt_status status, bt_errors *err)
 {
     const bool keep = keeps_failure(s);
     status = bt_running_end(&s->r, status, err);
-    if (keep) bt_run_keep_failure(bt_comm_world(), &s->c, &s->o, s->r.failed, err);
+    if (keep) bt_run_keep_failure(bt_comm_world(), &s->c, &s->o, s->r.failed, s->m.start, err);
     return status;
 }
 

@@ -11,6 +11,7 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "case/case_check.h"
+#include "case/case_files.h"
 #include "case/value.h"
 #include "run/study_axes.h"
 
@@ -32,8 +33,7 @@ static void add(bt_study_files *f, char *path)
 
 static char *text_of(const bt_key *k, const bt_case *c)
 {
-    char *text;
-    memcpy(&text, (const char *)c + k->offset, sizeof text);
+    const char *text = bt_case_file(c, k);
     return text ? bt_text_copy(text) : NULL;
 }
 
@@ -75,7 +75,7 @@ void bt_study_files_find(bt_study_files *f, const bt_study *s)
     bt_errors unheard = {0};
     if (bt_study_base_case(s, &c, &unheard) == BT_OK)
         for (int k = 0; k < bt_n_case_keys; k++)
-            if (bt_case_keys[k].file) add(f, text_of(&bt_case_keys[k], &c));
+            add(f, text_of(&bt_case_keys[k], &c));
     bt_case_free(&c);
     bt_errors_free(&unheard);
     add_of_axes(f, s);
@@ -86,15 +86,6 @@ void bt_study_files_free(bt_study_files *f)
     for (int i = 0; i < f->n; i++) free(f->list[i].path);
     free(f->list);
     *f = (bt_study_files){0};
-}
-
-/// What a text kept says behind "PATH: ", to the end of the line; NULL = nothing.
-static const char *kept_of(const char *text, const char *path)
-{
-    const size_t n = strlen(path);
-    for (const char *at = text; at && *at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
-        if (!strncmp(at, path, n) && !strncmp(at + n, ": ", 2)) return at + n + 2;
-    return NULL;
 }
 
 bt_status bt_study_files_keep(const bt_study_files *f, const char *dir, bool old, bt_errors *warnings, bt_errors *err)
@@ -112,7 +103,7 @@ bt_status bt_study_files_keep(const bt_study_files *f, const char *dir, bool old
         const bt_named_file *x = &f->list[i];
         char line[96];
         snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", x->bytes, x->digest);
-        const char *before = kept_of(kept, x->path);
+        const char *before = bt_case_said_of(kept, x->path);
         if (before && strncmp(before, line, strlen(line))) {
             bt_errors_add(err, "%s: has changed since members in %s were made with it, and is of another study now; "
                                "restore it, or give another folder with -o", x->path, dir);

@@ -115,7 +115,21 @@ def test_a_line_that_a_kill_kept_out_of_the_journal_is_added(quiet, tmp_path):
     assert ensemble(tmp_path).returncode == DONE and len(journal(tmp_path)) == len(lines)
 
 
-def test_interrupted(quiet, tmp_path):
+def test_a_reader_that_has_gone(quiet, tmp_path):
+    """Red when SIGPIPE ends the ensemble after its first line."""
+    folder, _ = quiet
+    prepare(tmp_path)
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = subprocess.run([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                            env=environment(OMP_NUM_THREADS=1), stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert result.returncode == IO and "standard output: cannot be written" in result.stderr
+    assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_interrupted(quiet, tmp_path, number):
     folder, _ = quiet
     prepare(tmp_path)
     child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
@@ -126,7 +140,7 @@ def test_interrupted(quiet, tmp_path):
                              text=True)
     while not list(tmp_path.glob("all/members/*/result*.h5")):
         time.sleep(0.01)
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     out, err = child.communicate(timeout=60)
     assert child.returncode == SIGNAL and "goes on with the" in err
     with h5py.File(tmp_path / "all/ensemble.h5") as f:

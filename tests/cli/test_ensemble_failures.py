@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What a member can die of: a bad value, a full disk, a dead rank. It is named, up to the report, and the rest
 complete."""
+import errno
 import json
 import os
 import re
@@ -16,7 +17,8 @@ import numpy as np
 import pytest
 
 import faults
-from harness import BERGTOW, CASE, DONE, IO, NUMERIC, TOW, call, changed, differing, write_case
+from harness import (BERGTOW, CASE, DONE, IO, NUMERIC, RANK, TOW, call, changed, differing, environment, launcher,
+                     write_case)
 from resuming import children, started
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
@@ -274,3 +276,14 @@ def test_members_that_cannot_be_read(tmp_path):
                 assert re.search("Input/output error|could not be read", result.stderr), (n, result.stderr)
         assert outcomes == {DONE, IO}
         assert ensemble(tmp_path).returncode == DONE and (folder / "ensemble.h5").read_bytes() == whole
+
+
+def test_a_base_case_that_one_rank_cannot_read(tmp_path):
+    """Red when the other goes on to share the cores with it: a message about MPI, or a call that hangs."""
+    prepare(tmp_path)
+    rank = f'[ "{RANK}" = 1 ] || unset LD_PRELOAD; exec "$0" "$@"'
+    stale = f"export LD_PRELOAD={faults.CALLS} BT_CALLS=open,openat BT_CALLS_AT=1 BT_CALLS_WITH={errno.ESTALE}; "
+    env = environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, BT_CALLS_UNDER=tmp_path / "base.yml")
+    words = [*launcher(2), "sh", "-c", stale + rank, BERGTOW, "ensemble", tmp_path / "study.yml", "-o", "all"]
+    result = faults.started(words, env, tmp_path)
+    assert result.returncode == IO and "base.yml: cannot" in result.stderr and "Stale file" in result.stderr, result

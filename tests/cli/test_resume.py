@@ -28,13 +28,14 @@ def whole(tmp_path_factory):
     return folder, run(folder, LONG, "--quiet", name="whole")
 
 
-def begun(folder, name, *arguments):
+def begun(folder, name, *arguments, **more):
     p = subprocess.Popen([BERGTOW, "run", "case.yml", "-o", name, "--quiet", *map(str, arguments)],
                          cwd=folder,
                          env=environment(OMP_NUM_THREADS=1),
                          stdout=subprocess.PIPE,
                          stderr=subprocess.PIPE,
-                         text=True)
+                         text=True,
+                         **more)
     end = time.time() + 30
     while not (folder / name / "result.part.h5").exists() and time.time() < end:
         time.sleep(0.005)
@@ -56,7 +57,7 @@ def resumed(folder, name, *arguments, code=DONE, **more):
 
 # ---- stops ----
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR2])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR2, signal.SIGHUP])
 def test_stopped_by_a_signal(whole, number):
     folder, one = whole
     name = f"signal{int(number)}"
@@ -68,6 +69,16 @@ def test_stopped_by_a_signal(whole, number):
     assert 0 < n < STEPS
     assert resumed(folder, name) == ""
     assert_same_result(one.dir, folder / name)
+
+
+def test_nohup(whole):
+    """The end of the session is ignored before the run begins, and stays so."""
+    folder, _ = whole
+    p = begun(folder, "nohup", preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    p.send_signal(signal.SIGHUP)
+    time.sleep(0.1)
+    p.send_signal(signal.SIGTERM)
+    assert f"stopped by signal {int(signal.SIGTERM)} after step" in ended(p, SIGNAL)
 
 
 def test_a_checkpoint_by_a_signal(whole):
@@ -148,6 +159,23 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     assert Run(tmp_path / "out", None).summary["n_steps"] == STEPS
 
 
+def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
+    """The run starts again by it, and would be another one. case.resolved.yml of earlier versions does not tell."""
+    table, resolved = tmp_path / "wind.csv", tmp_path / "out/case.resolved.yml"
+    table.write_text("t,u,v\n0,1,0\n40,-2,3\n")
+    write_case(tmp_path, changed(LONG, air__wind_table="wind.csv"))
+    p = begun(tmp_path, "out")
+    p.kill()
+    p.communicate()
+    table.write_text("t,u,v\n0,1,0\n40,-2,4\n")
+    assert f"{table}: has changed since the run in out began; restore it" in resumed(tmp_path, "out", code=REFUSED)
+    table.write_text("t,u,v\n0,1,0\n40,-2,3\n")
+    kept = shutil.copytree(tmp_path / "out", tmp_path / "kept")
+    assert resumed(tmp_path, "kept", "--steps", 2) == "" and (kept / "checkpoint.h5").exists()
+    resolved.write_text(re.sub("# air.wind_table: .*", "", resolved.read_text()))
+    assert f"warning: {table}: nothing in out tells what it held" in resumed(tmp_path, "out", "--steps", 2)
+
+
 @pytest.mark.parametrize("arguments, code, text", [
     ([], USAGE, "no folder given"),
     (["nowhere"], IO, "nowhere: there is no such folder"),
@@ -222,6 +250,22 @@ def test_a_damaged_result_is_not_continued(stopped):
     shutil.copy(whole / "result.h5", folder / "out/result.h5")
     assert resumed(folder, "out") == ""
     assert_same_result(whole, folder / "out")
+
+
+def test_a_resume_that_cannot_begin_leaves_the_folder(stopped):
+    """Red when it takes the summary away first, or leaves a result that it has begun: at a limit on the size of files,
+    and at a result that is refused."""
+    folder, _ = stopped
+    def held():
+        return {p.name: p.read_bytes() for p in (folder / "out").iterdir()}
+    before = held()
+    for kilobytes in 10, 60:
+        limit = (1024 * kilobytes, ) * 2
+        resumed(folder, "out", code=IO, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+        assert held() == before
+    flip(folder / "out/result.h5", 99999)
+    resumed(folder, "out", code=REFUSED)
+    assert held().keys() == before.keys()
 
 
 def test_without_a_body_in_a_domain_far_from_the_origin(tmp_path):
@@ -413,3 +457,20 @@ def test_a_guard_leaves_the_state_before(tmp_path, guard, value, text):
     free = run(tmp_path, JAM, "--quiet", "--steps", step - 1, name="free")
     text = call("diff", free.dir, r.dir / "failure.h5").stdout
     assert text.startswith("/case/resolved: the texts differ"), text # and nothing before it: bodies
+
+
+def test_a_failure_is_told_before_the_state_is_made_again(tmp_path):
+    """That takes as long as the run has, and is given up where --max-wall, counted from the first start, is over.
+    The run is held from its first line until then."""
+    write_case(tmp_path, changed(LONG, guard__energy=1e-3))
+    start = time.time()
+    p = begun(tmp_path, "out", "--max-wall", 4)
+    line = p.stderr.readline()
+    p.send_signal(signal.SIGSTOP)
+    assert re.search(r"step \d+: the bodies have", line), line
+    time.sleep(max(0, start + 4.1 - time.time()))
+    p.send_signal(signal.SIGCONT)
+    rest = p.stderr.read() # communicate would lose what has been read ahead
+    assert re.search(r"the \d+ steps up to the state before .*\n.*made again: stopped meanwhile; .*resume out", rest)
+    ended(p, NUMERIC)
+    assert not (tmp_path / "out/failure.h5").exists()

@@ -276,3 +276,19 @@ def test_a_table_that_cannot_be_printed(tmp_path):
                                 stderr=subprocess.PIPE, text=True, env=environment(OMP_NUM_THREADS=1), timeout=30)
     assert result.returncode == IO and "standard output" in result.stderr
     assert Run(tmp_path / "out", result).summary["n_steps"] == 5
+
+
+@pytest.mark.parametrize("gone", ["stdout", "stderr"])
+def test_a_reader_that_has_gone(tmp_path, gone):
+    """Red when SIGPIPE ends the run: at the table, longer than a buffer, before the result stands; at the second line
+    of progress."""
+    case = changed(TOW, run__title="A long title" * 340, output__progress=0.01)
+    reader, writer = os.pipe()
+    os.close(reader)
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | {gone: writer}
+    result = subprocess.run([BERGTOW, "run", write_case(tmp_path, case), "-o", tmp_path / "out"], text=True,
+                            env=environment(OMP_NUM_THREADS=1), timeout=30, **streams)
+    os.close(writer)
+    assert result.returncode == (IO if gone == "stdout" else DONE)
+    assert gone == "stderr" or "standard output: cannot be written" in result.stderr
+    assert Run(tmp_path / "out", result).summary["n_steps"] == 300 and (tmp_path / "out/checkpoint.h5").exists()

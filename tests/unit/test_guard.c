@@ -4,7 +4,10 @@
 #include "scene.h"
 
 #include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
 
+#include "bergtow/run.h"
 #include "contact/contacts.h"
 #include "loads/impact.h"
 #include "output/observe.h"
@@ -441,6 +444,31 @@ static void no_floe_is_drawn_beyond_the_scale(void **state)
     bt_case_free(&c);
 }
 
+/// The limit of a run that goes on is that of its start: red when it is taken anew, once the law draws no longer.
+static void the_limit_of_energy_goes_on(void **state)
+{
+    (void)state;
+    static const char *const text =
+        "run: {dt: 0.1 s, duration: 2 s}\ndomain: {length: 100 m, width: 100 m, ends: open, sides: open}\n"
+        "ice: {concentration: 0, size: 1 m, thickness: 0.1 m}\nbody: {shape: none}\ntow: {mode: none}\n"
+        "floes: [{shape: disc, length: 1 m, x: 50 m, y: 0 m, thickness: 0.1 m}]\nguard: {energy: 2}\n";
+    char folder[] = "/tmp/bergtow-guard-XXXXXX";
+    assert_non_null(mkdtemp(folder));
+    bt_errors err = {0};
+    bt_case c;
+    const bt_run_options o = {.dir = folder, .quiet = true, .threads = 1, .dump_step = -1, .max_steps = 10};
+    stream = 3;
+    bt_status status = bt_case_read_text(&c, "case", text, NULL, NULL, 0, &err);
+    if (status == BT_OK) status = bt_run(&bt_comm_alone, &c, &o, &err);
+    stream = 0;
+    if (status == BT_OK) status = bt_run_resume(&bt_comm_alone, &o, &err);
+    if (status != BT_OK) fail_msg("%s", err.text[0]);
+    bt_case_free(&c);
+    char command[64];
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    assert_int_equal(system(command), 0);
+}
+
 // --- the last state --------------------------------------------------------------------------------------------------
 
 /// What the last look finds is what the next step finds, and the state stays as it was.
@@ -490,6 +518,7 @@ int main(void)
         cmocka_unit_test(numbers_that_are_none_are_found_in_samples),
         cmocka_unit_test(no_floe_is_driven_beyond_the_scale),
         cmocka_unit_test(no_floe_is_drawn_beyond_the_scale),
+        cmocka_unit_test(the_limit_of_energy_goes_on),
         cmocka_unit_test(overlap_of_the_last_state_is_that_of_the_next_step),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

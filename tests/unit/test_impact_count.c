@@ -202,7 +202,7 @@ static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
     k->closed[0] = (bt_impact){.time = 5, .peak = 1e6, .panel = 1};
     k->m.n_closed = 1;
     const bt_run_totals t = totals(STEPS);
-    assert_int_equal(bt_record_close(r, &t, NULL, err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, false, err), BT_OK);
     char path[200], wanted[200];
     snprintf(path, sizeof path, "%s/summary.json", dir);
     char *json = slurp(path);
@@ -237,7 +237,7 @@ static void every_row_of_the_file_is_counted(void **state)
     bt_errors err = {0};
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &k.c, &b, "", &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &k.c, &b, "", NULL, &err), BT_OK);
     assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
     go_on(&k, r, 0, STEPS, &err);
     check_end(&k, r, in_folder("rows"), &err);
@@ -264,7 +264,7 @@ static void a_record_that_goes_on_counts_the_same(void **state)
         bt_record *r;
         char dir[200];
         snprintf(dir, sizeof dir, "%s", in_folder(all[i].dir));
-        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", &err), BT_OK);
+        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", NULL, &err), BT_OK);
         assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
         go_on(&k, r, 0, all[i].at - 1, &err);
         const bt_sample s = sample(all[i].at - 1); // as the others, but for one number

@@ -145,7 +145,7 @@ static void samples_merge_by_the_rule_of_their_field(void **state)
     c.output.sample_every = 4;
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("merge"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("merge"), &c, &b, NULL, NULL, &err), BT_OK);
     for (int i = 0; i < 10; i++) { // 4 + 4 + 2
         bt_sample s = sample(i);
         s.ice_resistance = i;
@@ -155,7 +155,7 @@ static void samples_merge_by_the_rule_of_their_field(void **state)
         bt_record_sample(r, &s, &err);
     }
     const bt_run_totals t = totals(10);
-    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);
 
     const hid_t f = H5Fopen(in_folder("merge/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     double x[3];
@@ -238,11 +238,11 @@ static void an_empty_field_can_be_recorded(void **state)
                                 .names = names,
                                 .towed = 0};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, NULL, &err), BT_OK);
     const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
     assert_int_equal(bt_record_frame(r, 0, &row, NULL, &err), BT_OK);
     const bt_run_totals t = totals(0);
-    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);
     assert_int_equal(err.n, 0);
     char *xdmf = slurp(in_folder("empty/frames.xdmf"));
     assert_null(strstr(xdmf, "Name=\"floes\""));
@@ -274,10 +274,10 @@ static void many_floes_are_packed(void **state)
                                 .area = ones,
                                 .towed = -1};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, NULL, &err), BT_OK);
     assert_int_equal(bt_record_frame(r, 0, rows, NULL, &err), BT_OK);
     const bt_run_totals t = totals(0);
-    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);
     const hid_t f = H5Fopen(in_folder("many/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     hsize_t d[3];
     read_all(f, "/xdmf/000000/floe_points", H5T_NATIVE_FLOAT, d, points, sizeof points);

@@ -21,11 +21,11 @@ static void a_failed_run_leaves_no_old_summary(void **state)
     assert_int_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("again"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("again"), &c, &b, NULL, NULL, &err), BT_OK);
     assert_int_not_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const bt_sample s = sample(0);
     bt_record_sample(r, &s, &err);
-    assert_int_equal(bt_record_close(r, NULL, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, NULL, NULL, false, &err), BT_OK);
     assert_int_not_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const hid_t f = H5Fopen(in_folder("again/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     assert_int_equal(int_attribute(f, "/", "complete"), 0);
@@ -54,7 +54,7 @@ static void a_running_and_a_killed_run_can_be_read(void **state)
         const bt_case c = made_up_case();
         const bt_record_bodies b = bodies();
         bt_record *r;
-        if (bt_record_open(&r, &bt_comm_alone, in_folder("killed"), &c, &b, NULL, &err) != BT_OK) _exit(1);
+        if (bt_record_open(&r, &bt_comm_alone, in_folder("killed"), &c, &b, NULL, NULL, &err) != BT_OK) _exit(1);
         for (int i = 0; i < 700; i++) {
             const bt_sample s = sample(i);
             bt_record_sample(r, &s, &err);

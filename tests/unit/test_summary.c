@@ -77,13 +77,13 @@ static char *summary_of(bt_case *c, int steps, const bt_run_totals *t, bt_idx to
     bt_record_bodies b = bodies();
     b.towed = towed;
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("s"), c, &b, "", &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("s"), c, &b, "", NULL, &err), BT_OK);
     for (int i = 0; i < steps; i++) {
         bt_sample s = sample(i);
         if (spoil) spoil(&s, i);
         bt_record_sample(r, &s, &err);
     }
-    assert_int_equal(bt_record_close(r, t, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, t, NULL, false, &err), BT_OK);
     assert_int_equal(err.n, 0);
     return slurp(in_folder("s/summary.json"));
 }

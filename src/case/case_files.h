@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// The files that a case names: field, outlines, tables. A case says their paths alone. A run that was killed before its
+// first checkpoint begins again by its case.resolved.yml and reads them anew, so what they held is kept there, in a
+// comment for each:
+//
+//     # water.current_table: 312 bytes, xxh128 0123...
+//
+// Rejected: a checkpoint at time zero, which holds them. A checkpoint means that a new result stands and the old one
+// may go (output/folder.h), and that a member of an ensemble whose process dies gets on (run/ensemble_member.h).
+#ifndef BT_CASE_FILES_H
+#define BT_CASE_FILES_H
+
+#include "bergtow/case.h"
+#include "case/schema.h"
+
+/// The file of a key that names one, NULL = none.
+const char *bt_case_file(const bt_case *c, const bt_key *k);
+
+/// These comments, for all files that can be read; the caller frees them.
+char *bt_case_digests(const bt_case *c);
+
+/// Are the files what the comments in c->text say? dir: of the run, for the messages; a warning tells of which file
+/// there is no comment, as in those of earlier versions. Errors: BT_ERR_CASE.
+bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *warnings, bt_errors *err);
+
+/// What a text says behind "NAME: " at the beginning of a line, NULL = nothing.
+const char *bt_case_said_of(const char *text, const char *name);
+
+#endif
