@@ -4,6 +4,7 @@ down again here."""
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -16,6 +17,7 @@ from resuming import assert_same_result, done, killed_after
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import plot_impacts  # noqa: E402
+import report_run  # noqa: E402
 from bergtow_read import Run as Folder  # noqa: E402
 
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
@@ -199,6 +201,17 @@ def test_crushing_and_its_keys(line, tmp_path):
         run(tmp_path, changed(LINE, ice__size=0.4, impact={"conversion": "crushing", "corner": "real"}),
             name="real"))["corner"]
     assert len(np.unique(real.round(6))) > 10 and np.all((real > 0.3) & (real < np.pi))
+
+
+def test_a_wall_that_is_struck_is_no_floe():
+    """Ids from the number of floes on are those of bodies."""
+    def said(struck):
+        largest = dict.fromkeys(("peak_n", "mean_n", "duration_s", "impulse_ns", "approach_m_s", "time_s"), 1.0)
+        impacts = {"collisions": 3, "collisions_whole_run": 3, "conversion": "", "largest": largest | {"floe": struck}}
+        run = SimpleNamespace(summary={"impacts": impacts}, number=lambda key: 1.0, n_floes=7,
+                              bodies=[SimpleNamespace(name="berg"), SimpleNamespace(name="wall_y1")])
+        return dict(report_run.impacts(run)["rows"])["largest peak"]
+    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8)
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):
