@@ -199,7 +199,8 @@ def statistics(e, rows, options, gathered=None):
             "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
-            "fields": len(fields), "members": len(e.tows(rows, excluded=False)), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "fields": len(fields), "members": len(e.tows(rows, excluded=False)), "hours": total, "gap_s": gap,
+            **stat_load.summary(fields),
             "alike_p": stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {

@@ -217,8 +217,8 @@ def panel_lines(s):
             return f"panel {j} (at {p['bearing_deg'][j]:.0f}° from the body's x axis)"
         few = "" if p["fields"] == c["members"]["used"] else f" ({p['fields']} of {c['members']['used']} fields)"
         out.append(f"Hull panels, {c['label']}{few}: {at(k)} has the largest mean, "
-                   f"{number(p['mean'][k] / factor)} {unit} ({pair(p['mean_95'][k], factor)}); the largest mean of a step "
-                   f"is {number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
+                   f"{number(p['mean'][k] / factor)} {unit} ({pair(p['mean_95'][k], factor)}); the largest mean of a "
+                   f"step is {number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
     return out
 
 

@@ -567,7 +567,8 @@ def parting(folder, at, second=None, events=True, fields=10, jerk=None):
     rng, members, n = np.random.default_rng(2), [], 2000
     time, branches = np.arange(1.0, n + 1), 1 if second is None else 2
     for k in range(fields):
-        x, broken = made_up.ar1(0.9, n, rng, 1e6, 1e5) + (jerk or {}).get(k, 0) * (abs(time - 125.5) < 25), dict((b, t) for t, b in at.get(k, []))
+        x, broken = made_up.ar1(0.9, n, rng, 1e6, 1e5), dict((b, t) for t, b in at.get(k, []))
+        x += (jerk or {}).get(k, 0) * (abs(time - 125.5) < 25)
         tensions = {b: np.where(time < broken.get(b, np.inf), f * x, 0) for b, f in ((1, 1.0), (2, second)) if f}
         for b, t in broken.items():
             tensions[b][time == t] = 1.1 * BREAKING
