@@ -21,6 +21,16 @@ import h5py
 import numpy as np
 
 
+def within(time, start, end):
+    """[n] of bool: samples that end between two times, these included, but for a last one of fewer steps than the
+    others, which a run leaves that ends within it."""
+    slack = 1e-9 * max(1.0, abs(time[-1])) if len(time) else 0.0
+    there = (time >= start - slack) & (time <= end + slack)
+    if len(time) > 2 and time[-1] - time[-2] < (1 - 1e-6) * (time[-2] - time[-3]):
+        there[-1] = False
+    return there
+
+
 class RunError(Exception):
     """A run folder or one of its files cannot be used. str() reads "path: reason; remedy"."""
 
@@ -339,10 +349,11 @@ class Run:
 
     @property
     def speed_made_good(self):
-        """That over the window; NaN without a window of two samples."""
-        if self.window is None or np.sum((self["time"] >= self.window[0]) & (self["time"] <= self.window[1])) < 2:
+        """That over the window as long as something tows the body; NaN without two samples of it."""
+        if self.window is None:
             return np.nan
-        return self.made_good(*self.window)
+        start, end = self.window[0], min(self.window[1], self.adrift)
+        return self.made_good(start, end) if np.sum(within(self["time"], start, end)) > 1 else np.nan
 
     @property
     def verdict(self):
@@ -390,6 +401,16 @@ class Run:
             rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
             return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
         return self._once("events", read)
+
+    @property
+    def adrift(self):
+        """From when on nothing tows the body, s; inf where something does to the end."""
+        return min((e["time_s"] for e in self.events if e["kind"] == "adrift"), default=np.inf)
+
+    @property
+    def steps_per_sample(self):
+        """Steps in a sample of the series, output.sample_every."""
+        return int(self._file["series"].attrs.get("steps_per_sample", 1)) if "series" in self._file else 1
 
     # ---- case
 

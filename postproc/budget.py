@@ -46,24 +46,24 @@ def assumed(e):
 
 
 def quantile(e, rows, name, share):
-    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as the moving mean over the time
-    scale of loads.py, the largest value at 100 %; NaN where a member has no window that is long enough."""
+    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as loads.py has it, the largest
+    value at 100 %; NaN where a member has no window that is long enough. Errors: RunError where a line that parted cuts
+    the load off, or where it has no statistics."""
     scale, out, known = loads.TIME_SCALE / loads.scaling(e, rows), np.full(len(rows), np.nan), None
     for k, m in enumerate(rows):
-        start, end = e.number("window_start_s", m), e.number("window_end_s", m)
-        some, time = loads.of_member(e, m)
-        for load, x in some:
-            last = min(end, loads.until(e, m, load.name))
-            field = stat_load.field_of(time, x, start, last, scale) if load.name == name and np.isfinite(
-                [start, end]).all() else None
-            if field is not None:
+        for load, field, _ in loads.in_window(e, m, scale):
+            if load.name == name and (why := load.refused or loads.cut_off(e, rows, load)):
+                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it anew")
+            if load.name == name and field is not None:
                 known, out[k] = load, np.percentile(field["peak"], share)
     if known is None:
         return None, out
     hours = np.nanmedian([e.number("window_end_s", m) - e.number("window_start_s", m) for m in rows]) / 3600
     words = f"largest {known.label} of a tow, within {hours_text(hours)}" if share == 100 else \
         f"{known.label} that {100 - share:g} % of the time exceeds"
-    return {"units": known.units, "description": f"{words}, as the moving mean over {scale:.3g} s"}, out
+    words += f"; a quasi-static load is the mean over a step, the peak of a collision is by {known.conversion}" \
+        if known.conversion else f", as the moving mean over {scale:.3g} s"
+    return {"units": known.units, "description": words}, out
 
 
 def numbers(e, of):
@@ -77,7 +77,8 @@ def numbers(e, of):
             raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
                            "name another with --of, or run longer")
     elif of in e.summary:
-        meaning, values = e.meaning.get(of, {}), e.summary[of][e.used]
+        whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # what comes after a tow is in it
+        meaning, values = e.meaning.get(of, {}), (e.mean if of == OF[0] else whole)[e.used]
     else:
         raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE")
     there = np.isfinite(values)
@@ -126,7 +127,8 @@ def without_intervals(found):
 
 
 def of_ensemble(e, of=OF[0], computed=None):
-    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of means alone. Where
+    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of the mean ice resistance
+    alone: in per cent of it, which says nothing of a number with drag or inertia in it. Where
     members of the sample failed, or have no such number, nobody knows which values are missing, and there are no
     intervals. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
@@ -139,7 +141,7 @@ def of_ensemble(e, of=OF[0], computed=None):
     rows, values = done[there], values[there]
     lacking = [e.name[m] for m in sample if m not in rows and e.status[m] == FINISHED and e.name[m] not in e.copies]
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
-                               computed if ":" not in of else None)
+                               computed if of == OF[0] else None)
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")

@@ -70,8 +70,9 @@ def numerics_notes(found):
     """Sentences on what is known of the computation, and what is not."""
     n = found["numerics"]
     if not n:
-        return "" if ":" in found["of"] else \
-            " Numerics: run `bergtow converge` on the base case and name its file with --converge."
+        return " Numerics: run `bergtow converge` on the base case and name its file with --converge." \
+            if found["of"] == "mean_ice_resistance_n" else \
+            " Numerics: `bergtow converge` knows what the computation adds to the mean ice resistance alone."
     if "refused" in n:
         return f" Numerics: {n['refused']}."
     said = ""

@@ -27,7 +27,7 @@ import compared
 import domain_width
 import findings
 import stat_mean
-from bergtow_read import Run, RunError, case_value, parse_case
+from bergtow_read import Run, RunError, case_value, parse_case, within
 from case_file import files, section
 from case_runs import SPENT, CaseRuns, above_zero, checked, program, whole_from
 
@@ -48,12 +48,12 @@ class Trial:
     """What one run says."""
 
     field: int
-    speed: float      #: m/s, mean over the time of the window in which the speed to be kept is ordered
+    speed: float      #: m/s, mean over the time of the window in which the speed to be kept is ordered; NaN: adrift
     late: float       #: that over the last quarter of it
     stood: bool       #: it stood still for a while, held by the ice
     parted: bool
-    tow_force: float  #: N, mean
-    tension: float    #: N, largest step mean of the window
+    tow_force: float  #: N, mean; NaN: adrift
+    tension: float    #: N, largest step mean of the run, its start included
     widths: float = np.nan  #: of the domain in body widths
     needed: float = np.nan  #: those that the ice asks for, NaN where it asks for none
 
@@ -79,14 +79,16 @@ def trial(run, number, least):
     """Of a run that is there. Errors: RunError."""
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer")
-    if not np.isfinite(run.speed_made_good):
+    if np.sum(within(run["time"], *run.window)) < 2:
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
-    speed, late = map(float, kept(run, least))
+    # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted
+    towed = run.adrift >= run.window[1]
+    speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
     return Trial(number, speed, late, run.number("stalled_windows") > 0,
-                 any(e["kind"] == "line_broken" for e in run.events),
-                 run.number("mean_tow_force_n"), run.number("peak_line_tension_n"), widths, needed)
+                 any(e["kind"] == "line_broken" for e in run.events), force,
+                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))), widths, needed)
 
 
 @dataclass
@@ -196,8 +198,9 @@ def row_of(c, value, least):
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
         out[name] = x.tolist()
-        out[f"mean_{name}"] = x.mean()
-        out[f"mean_{name}_95"] = stat_mean.t_interval(x) if len(x) > 1 else (np.nan, np.nan)
+        there = x[np.isfinite(x)]
+        out[f"mean_{name}"] = there.mean() if len(there) else np.nan
+        out[f"mean_{name}_95"] = stat_mean.t_interval(there) if len(there) > 1 else (np.nan, np.nan)
     return out
 
 

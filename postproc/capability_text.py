@@ -64,6 +64,9 @@ def meaning(found):
     line = ", and no branch of its line parts" if found["breaking_load"] else ""
     more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that "
             "failed could have changed it.") if failed else ""
+    if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
+        more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
+                 "tension, the largest of a step, the start included, is among the others.")
     return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
             f"over the window, as far as it is ordered to be so fast there, and over the last quarter of that "
             f"time{line}. Stood still: tows that the ice held for a while. "
@@ -111,7 +114,9 @@ def _curve(axes, c, name, colour, factor, unit):
     mean = _numbers([p[f"mean_{name}"] for p in c["points"]])
     low, high = np.array([_numbers(p[f"mean_{name}_95"]) for p in c["points"]]).reshape(-1, 2).T
     for at, p in zip(x, c["points"]):
-        axes.plot(np.full(p["fields"], at), _numbers(p[name]) / unit, ".", color=colour, alpha=0.35, markersize=5)
+        y, adrift = _numbers(p[name]) / unit, np.isnan(_numbers(p["speed"]))
+        for some, mark in ((~adrift, "."), (adrift, "x")):
+            axes.plot(np.full(np.sum(some), at), y[some], mark, color=colour, alpha=0.35, markersize=5)
     axes.plot(x, mean / unit, color=colour, label=c["label"])
     least = np.array([least_of(p[name]) for p in c["points"]])
     axes.fill_between(x, np.maximum(low, least) / unit, high / unit, color=colour, alpha=0.15, linewidth=0)
@@ -135,6 +140,7 @@ def figure(found):
     words = "concentration, %" if percent else f"{found['search']}, {found['unit']}".rstrip(", ")
     largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
     kilo, newton = scale(largest, "N")
+    parted = any(None in p["speed"] for c in some for p in c["points"])
     parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
     for axes, name, label, unit in ((grid[0, 0], "speed", "speed made good, m/s", 1.0),
                                     (grid[0, 1], "tension", f"largest line tension, {newton}", kilo)):
@@ -167,5 +173,6 @@ def figure(found):
         axes.set_ylim(*sorted(factor * v for v in found["range"]))
         axes.grid(True)
     style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
-               "dots: fields; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
+               "dots: fields" + ", crosses: those whose line parted" * parted +
+               "; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
     return fig

@@ -29,7 +29,7 @@ from pathlib import Path
 import command
 import findings
 import stat_mean
-from bergtow_read import Run, RunError
+from bergtow_read import Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, program, whole_from
 
 import numpy as np
@@ -85,7 +85,8 @@ def wider(run, k):
 
 
 def mean_resistance(run):
-    return run.number("mean_ice_resistance_n")
+    """NaN where the tow ends within the window: what comes after is no resistance to a tow."""
+    return run.number("mean_ice_resistance_n") if run.window and run.adrift >= run.window[1] else np.nan
 
 
 @dataclass(frozen=True)
@@ -195,9 +196,14 @@ def window(study, margin):
                 if run.window is None:
                     return [{"name": "window", "key": "output.window_start", "judged": "open",
                              "why": "a run has no window"}]
+                if run.adrift < run.window[1]:
+                    return [{"name": "window", "key": "output.window_start", "judged": "open",
+                             "why": "the line of a run parts before the end of its window"}]
                 (start, end), t, x = run.window, run["time"], run["ice_resistance"]
+                first = start + (run.steps_per_sample - 1) * run.value("run.dt")
             middle = 0.5 * (start + end)
-            rows.append((x[(t >= start) & (t <= end)].mean(), x[(t > middle) & (t <= end)].mean(), start, middle))
+            inside = within(t, first, end)
+            rows.append((x[inside].mean(), x[inside & (t > middle)].mean(), start, middle))
         base, late, starts, middles = np.array(rows).T
         value, interval = effect(base, late)
         row = {"name": "window", "key": "output.window_start", "unit": "s", "from": starts.mean(), "to": middles.mean(),
@@ -217,6 +223,8 @@ def fields_row(study):
     """How many fields the mean needs, from those that are there."""
     kept = [i for i in range(FIELDS[-1]) if study.kept("case", i, {})]  # one in between may have met the budget
     n, x = len(kept), study.measured("case", kept, mean_resistance)
+    if not np.isfinite(x).all():
+        return [{"name": "fields", "key": "repeats", "judged": "open", "why": "a run has no mean ice resistance"}]
     low, high = stat_mean.t_interval(x)
     needed = stat_mean.fields_needed(x.mean(), np.std(x, ddof=1), EFFORT)
     return [{"name": "fields", "key": "repeats", "fields": n, "quantity": "mean ice resistance", "mean": x.mean(),

@@ -39,7 +39,7 @@ def advice(row):
 
 
 def cells(row):
-    if row["name"] == "fields":
+    if "mean" in row:
         return ["fields", "–", f"mean {number(row['mean'])} N", "–", f"{row['fields']}", WORDS[row["judged"]],
                 advice(row)]
     if "from" not in row:

@@ -33,7 +33,7 @@ MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted
 def member(e, m):
     """Mean of one member with its standard error within the run."""
     within = stat_mean.series_mean(e.steady(m))
-    mean = e.number("mean_ice_resistance_n", m)
+    mean = e.mean[m]
     low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
     return {
         "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
@@ -109,7 +109,7 @@ def extremes(e, rows, options):
 def drift(e, rows, mean):
     """Does the mean of all fields change over the window? From the line through each member's ice resistance, which one
     run alone may not tell from its noise."""
-    change = e.summary.get("window_series_ice_resistance_change_n", np.full(e.n, np.nan))[rows]
+    change = np.array([e.number("window_series_ice_resistance_change_n", m) for m in rows if not e.cut(m)])
     change = change[np.isfinite(change)]
     if len(change) < LEAST_DRIFT:
         return {"verdict": "not judged", "words": "too few fields, or results of an earlier version"}
@@ -197,7 +197,7 @@ def nothing_to_count(e, dropped):
                         "run `bergtow ensemble` again: it runs them anew")
     if np.any(e.status == FINISHED):
         return RunError(e.file, f"has no member with a mean ice resistance{failures}",
-                        "tow a body, for longer than output.window_start")
+                        "tow a body, on a line that holds, for longer than output.window_start")
     return RunError(e.file, f"has no member that has finished{failures}",
                     "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
 

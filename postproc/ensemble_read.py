@@ -3,7 +3,7 @@
 
     e = Ensemble("out/concentration")
     for c in e.conditions():                       # members of one combination of values
-        print(c.label, e.summary["mean_ice_resistance_n"][c.finished])
+        print(c.label, e.mean[c.finished])
     time, ice = e.series(m)                        # of member m, all of its run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
@@ -21,10 +21,13 @@ import h5py
 import numpy as np
 
 import soundness
-from bergtow_read import Run, RunError
+from bergtow_read import Run, RunError, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 MIN_INDEPENDENT = 20  # samples below which the program itself calls a window short
+#: s at full scale, five time scales of loads.py: a tow whose line parts earlier in the window has no mean, since what
+#: comes shortly before that is the largest of all
+LEAST_TOW = 150.0
 
 #: in a warning, from when on nothing tows
 LAST_PARTED = re.compile(r"the last line parted(?: at ([-+.e\d]+) s)?").search
@@ -49,7 +52,7 @@ class Condition:
     values: dict          #: {key: number or text}
     units: dict           #: {key: unit}
     members: np.ndarray   #: rows of all its members
-    finished: np.ndarray  #: rows of those that finished and are not excluded
+    finished: np.ndarray  #: rows of those that finished with a mean and are not excluded
     failed: int
     waiting: int
     excluded: int
@@ -209,13 +212,44 @@ class Ensemble:
         return time[there], x[there]
 
     def steady(self, m):
-        """Ice resistance over the steady window that the member's summary names, N; empty where it names none."""
+        """Ice resistance over the window of a member's tow, N; empty where there is none."""
         time, ice = self.series(m)
-        start, end = self.number("window_start_s", m), self.number("window_end_s", m)
-        if not np.isfinite([start, end]).all():
-            return np.zeros(0)
-        slack = 1e-9 * max(1.0, abs(end))
-        return ice[(time >= start - slack) & (time <= end + slack)]
+        start, end = self.window(m, time)
+        return ice[within(time, start, end)] if np.isfinite([start, end]).all() else np.zeros(0)
+
+    # ---- the tow
+
+    def adrift(self, m):
+        """From when on nothing tows the body of a member, s; inf where something does to the end."""
+        return min((v["time_s"] for v in self.events(m) or [] if v["kind"] == "adrift"), default=np.inf)
+
+    def cut(self, m):
+        """Does a member's tow end within the window that its summary names, or before it? Numbers of the summary over
+        the window are then not those of a tow."""
+        return self.adrift(m) < self.number("window_end_s", m)
+
+    def window(self, m, time):
+        """(start, end) of that window as long as something tows the body, s, for samples that end at `time`: the end of
+        the first that holds no step before it, and of the last; NaN where the summary names none."""
+        start, end, dt = (self.number(key, m) for key in ("window_start_s", "window_end_s", "dt_s"))
+        late = np.median(np.diff(time)) - dt if len(time) > 1 and np.isfinite(dt) else 0.0
+        return start + late, min(end, self.adrift(m))
+
+    def scaling(self, m):
+        """Time at full scale / time of a member: the root of its length scale."""
+        scale = self.number("estimates_length_scale", m)
+        return float(np.sqrt(scale)) if scale > 0 else 1.0
+
+    @cached_property
+    def mean(self):
+        """Mean ice resistance of each member's tow in its window [M], N; NaN where it has none."""
+        out = np.array(self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan)), dtype=float)
+        for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(out)):
+            if self.cut(m):
+                long = self.adrift(m) - self.number("window_start_s", m) >= LEAST_TOW / self.scaling(m)
+                x = self.steady(m) if long else []
+                out[m] = np.mean(x) if len(x) else np.nan
+        return out
 
     def _texts(self, m):
         """summary.json of a member, {} where its folder is not there."""
@@ -297,8 +331,7 @@ class Ensemble:
     @property
     def without_mean(self):
         """Finished members that have no mean ice resistance."""
-        mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
-        return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(mean))]
+        return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(self.mean))]
 
     def holes(self):
         """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where
@@ -333,8 +366,7 @@ class Ensemble:
     @property
     def used(self):
         """Rows of members that finished with a mean, are not excluded, and are no copies."""
-        mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
-        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean))
+        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(self.mean))
                          if int(m) not in self._dropped and self.name[m] not in self.copies], dtype=int)
 
     @cached_property
@@ -374,19 +406,22 @@ class Ensemble:
                           sum(int(m) in self._dropped for m in rows)))
         return out
 
-    def tows(self, rows):
-        """Rows of all finished members of the conditions of these, of those that are excluded, too, each
-        once."""
+    def tows(self, rows, excluded=True):
+        """Rows of all finished members of the conditions of these, with a mean or not, each once; excluded: of those
+        that are excluded, too."""
         there = np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED)
-        return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies], dtype=int)
+        return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies
+                         and (excluded or int(m) not in self._dropped)], dtype=int)
 
     def impacts(self, m):
-        """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they
-        were not told apart, or without a window."""
-        hours, start = self.number("impacts_hours", m), self.number("impacts_from_s", m)
+        """Collisions of a member's tow in its window: (time s, peak N, its start s, hours, conversion), or None where
+        they were not told apart, or without a window."""
+        hours, start, end = (self.number(key, m) for key in ("impacts_hours", "impacts_from_s", "window_end_s"))
+        if self.cut(m):
+            hours, end = hours - (end - self.adrift(m)) / 3600, self.adrift(m)
         if not hours > 0 or not self.folder(m).is_dir():
             return None
         with Run(self.folder(m)) as run:
             hits = run.impacts
-        late = hits["time"] >= start
+        late = (hits["time"] >= start) & ~(hits["time"] > end)
         return hits["time"][late], hits["peak"][late], start, hours, hits["conversion"]

@@ -235,7 +235,7 @@ def report(s, markdown=False):
     if s["without_mean"]:
         lines.append(
             f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
-            f"steady window, or no body."
+            f"window, nothing that is towed, or a line that parted before the window or early in it."
         )
     if not s["checked"]:
         lines.append(

@@ -26,7 +26,6 @@ import numpy as np
 import stat_alike
 import stat_extreme
 import stat_load
-import stat_mean
 from bergtow_read import Run, RunError
 from text_table import quantity
 
@@ -51,6 +50,7 @@ class Load:
     units: str
     description: str
     applies: str = ""     #: what a run must have for it, in the words of the registry
+    refused: str = ""     #: why there are no statistics of it
     conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
 
 
@@ -61,10 +61,12 @@ def _floe_force(run):
     push, peak = run["largest_push"], run["impact_peak"]
     if not (np.isfinite(push).any() and np.isfinite(peak).any()):
         return None
-    conversion = str(run.impacts["conversion"])
+    conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
     return Load("floe_force", "force of one floe", run.units("largest_push"),
-                "largest force of one floe on the towed body: as the mean over a step, or the peak of a "
-                "collision", conversion=conversion), np.maximum(push, peak)
+                "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
+                "collision", conversion=conversion,
+                refused=f"of every {steps} steps the largest alone was kept; set output.sample_every: 1"
+                if steps > 1 else ""), np.maximum(push, peak)
 
 
 def _panel_load(run):
@@ -97,15 +99,14 @@ def of_member(e, m):
 
 def scaling(e, rows):
     """Time at full scale / time in a condition: the root of its length scale."""
-    found = e.summary.get("estimates_length_scale", np.ones(e.n))[rows]
-    return float(np.sqrt(found[0])) if len(found) and np.isfinite(found[0]) and found[0] > 0 else 1.0
+    return e.scaling(rows[0]) if len(rows) else 1.0
 
 
 def until(e, m, name):
     """Time up to which a load of a member is that of a tow, s: a tension until its branch parts, any other load until
     no branch is left."""
-    return min((v["time_s"] for v in e.events(m) or [] if v["kind"] == ADRIFT
-                or v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"), default=np.inf)
+    return min((v["time_s"] for v in e.events(m) or [] if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
+               default=e.adrift(m))
 
 
 def tows_with(e, rows, *kinds):
@@ -121,21 +122,34 @@ def cut_off(e, rows, load):
     return f"the line parted in {n} of {len(tows)} tows" if n else ""
 
 
+def in_window(e, m, time_scale):
+    """[(Load, field, start)] of a member: every load in the window, as long as it is that of a tow, and before it, as
+    stat_load.field_of and start_up have them, None where there is none."""
+    out, (some, time) = [], of_member(e, m)
+    start, end = e.window(m, time)
+    for load, x in some if np.isfinite([start, end]).all() else []:
+        scale, last = 0.0 if load.conversion else time_scale, min(end, until(e, m, load.name))
+        out.append((load, stat_load.field_of(time, x, start, last, scale),
+                    stat_load.start_up(time, x, start, last, scale)))
+    return out
+
+
 def gather(e, rows, options):
-    """({name: (Load, [field, ...])}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of makes
-    them, and the loads that are left out: those that are constant over all fields together, and those whose collisions
-    the members convert in different ways. A field in which a load is constant is a field like any other: ice that the
+    """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of
+    makes them, the largest start-up of all its tows, also of those whose line parts in it, and the loads that are left
+    out: those that are refused, that are constant over all fields together, and whose collisions the members convert in
+    different ways. A field in which a load is constant is a field like any other: ice that the
     tow does not meet is a load of zero, and its hours count. options: time_scale (None: the default)."""
-    out, why = {}, {}
+    out, starts, why = {}, {}, {}
     time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
-    for m in rows:
-        start, end = e.number("window_start_s", m), e.number("window_end_s", m)
-        some, time = of_member(e, m)
-        for load, x in some:
-            scale = 0.0 if load.conversion else time_scale
-            last = min(end, until(e, m, load.name))
-            field = stat_load.field_of(time, x, start, last, scale) if np.isfinite([start, end]).all() else None
-            if field is not None:
+    for m in e.tows(rows, excluded=False):
+        for load, field, start in in_window(e, m, time_scale):
+            if load.refused:
+                why[load.name] = {"label": load.label, "why": load.refused}
+                continue
+            if start is not None:
+                starts.setdefault(load.name, []).append(start | {"member": int(m)})
+            if field is not None and m in rows:
                 out.setdefault(load.name, []).append((load, field | {"member": int(m)}))
     found = {}
     for name, some in out.items():
@@ -146,7 +160,7 @@ def gather(e, rows, options):
             why[name] = {"label": load.label, "why": f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all "
                                                      f"{len(fields)} fields"}
         else:
-            found[name] = load, fields
+            found[name] = load, fields, max(starts.get(name, []), key=lambda s: s["largest"], default=None)
     return found, why
 
 
@@ -172,12 +186,11 @@ def statistics(e, rows, options, gathered=None):
     gathered = gather(e, rows, options)[0] if gathered is None else gathered
     tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
-    for name, (load, fields) in gathered.items():
+    for name, (load, fields, start) in gathered.items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
-        first = max((f for f in fields if f["start_up"]), key=lambda f: f["start_up"]["largest"], default=None)
-        start_up = first and first["start_up"]
-        if start_up and name == ALWAYS[0]:
-            start_up = start_up | {"inertia": _inertia(e, first["member"], start_up["time_s"], first["scale"])}
+        start_up = start and {what: start[what] for what in ("largest", "time_s")}
+        if start and name == ALWAYS[0]:
+            start_up |= {"inertia": _inertia(e, start["member"], start["time_s"], start["scale"])}
         why = cut_off(e, rows, load)
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
             fields, gap, [*options.hours, design_hours], options.resamples)
@@ -186,7 +199,8 @@ def statistics(e, rows, options, gathered=None):
             "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
-            "fields": len(fields), "members": len(rows), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "fields": len(fields), "members": len(e.tows(rows, excluded=False)), "hours": total, "gap_s": gap,
+            **stat_load.summary(fields),
             "alike_p": stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
@@ -207,11 +221,12 @@ def _inertia(e, m, end, scale):
 
 
 def panels(e, rows):
-    """Means over the window and largest step means of every panel of the hull, over fields: {"mean", "mean_95",
-    "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their middles from the body's x axis
-    towards y, "units", "fields"}; None where members have none, or unlike numbers of them."""
+    """Means over the window and largest step means of every panel of the hull, over the fields that were towed to the
+    end of it: {"mean", "mean_95", "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their
+    middles from the body's x axis towards y, "units", "fields"}; None where members have none, or unlike numbers of
+    them."""
     mean, largest, units, middle = [], [], "", None
-    for m in rows:
+    for m in [m for m in rows if not e.cut(m)]:
         try:
             with Run(e.folder(m)) as run:
                 found, units = run.panels, run.panel_series["units"]
@@ -223,7 +238,7 @@ def panels(e, rows):
     if not mean or len({len(x) for x in mean}) > 1 or not np.isfinite(mean).all():
         return None
     def over(x):
-        return np.array([stat_mean.t_interval(column) for column in np.array(x).T])
+        return np.array([stat_load.mean_over_fields(column, 0.0) for column in np.array(x).T])
     return {
         "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
         "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),

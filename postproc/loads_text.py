@@ -231,9 +231,10 @@ def panel_lines(s):
         factor, unit = scale([p["largest"][most]], p["units"])
         def at(j, p=p):
             return f"panel {j} (at {p['bearing_deg'][j]:.0f}° from the body's x axis)"
-        out.append(f"Hull panels, {c['label']}: {at(k)} has the largest mean, {number(p['mean'][k] / factor)} {unit} "
-                   f"({pair(p['mean_95'][k], factor)}); the largest mean of a step is "
-                   f"{number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
+        few = "" if p["fields"] == c["members"]["used"] else f" ({p['fields']} of {c['members']['used']} fields)"
+        out.append(f"Hull panels, {c['label']}{few}: {at(k)} has the largest mean, "
+                   f"{number(p['mean'][k] / factor)} {unit} ({pair(p['mean_95'][k], factor)}); the largest mean of a "
+                   f"step is {number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
     return out
 
 

@@ -68,7 +68,7 @@ def headline(figure, e, subject):
 
 
 def of(e, rows):
-    return e.summary["mean_ice_resistance_n"][rows]
+    return e.mean[rows]
 
 
 def width_of(x, log):

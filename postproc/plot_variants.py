@@ -44,11 +44,11 @@ def panels(e):
     found = {}
     for c in e.conditions():
         others = tuple((k, v) for k, v in c.values.items() if k != KEY)
-        rows = c.finished[np.isfinite(e.summary["mean_ice_resistance_n"][c.finished])]
+        rows = c.finished
         found.setdefault(others, {})[c.values[KEY]] = rows
     out = []
     for others, some in found.items():
-        of = {name: dict(zip(e.repeat[rows].tolist(), e.summary["mean_ice_resistance_n"][rows]))
+        of = {name: dict(zip(e.repeat[rows].tolist(), e.mean[rows]))
               for name, rows in some.items() if len(rows)}
         first = order[0]
         if first not in of or len(of) < 2:

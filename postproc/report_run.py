@@ -196,15 +196,17 @@ def impacts(run):
         f"{i['collisions_whole_run']:.0f} in the whole run"
     ), ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))),
             ("mean ice resistance, quasi-static", force(run.number("impacts.mean_push_resistance_n"))),
-            ("largest quasi-static load of a floe",
+            ("largest quasi-static normal load of a floe or wall",
              force(run.number("impacts.largest_push_n")) + start_peak(run, "impacts.start_largest_push_n"))]
     big = i.get("largest")
     if isinstance(big, dict):
+        body = int(big["floe"]) - run.n_floes
+        struck = run.bodies[body].name if 0 <= body < len(run.bodies) else f"floe {big['floe']}"
         rows.append((
             "largest peak",
             f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "
             f"{style.short(big['impulse_ns'])} N s, "
-            f"approach {style.short(big['approach_m_s'])} m/s), floe {big['floe']} at {style.short(big['time_s'])} s" +
+            f"approach {style.short(big['approach_m_s'])} m/s), {struck} at {style.short(big['time_s'])} s" +
             start_peak(run, "impacts.start_largest_peak_n")))
     return {
         "conversion": i["conversion"], "rows": rows,

@@ -15,9 +15,9 @@ the same condition twice.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 import compared
+import stat_load
 import stat_sensitivity
 
 LEAST = 8            # conditions
@@ -45,19 +45,6 @@ def parts(groups):
     within = sum(np.sum((np.asarray(g) - m) ** 2) for g, m in zip(groups, means)) / freedom
     # of means: E between = s_p² + s_f² mean(1 / n)
     return Parts(float(grand), float(within), float(between - within * np.mean(1 / n)))
-
-
-def _interval(whole, without, log):
-    """95 % by the jackknife: of the number itself, or of its logarithm where it has one."""
-    n, without = len(without), np.asarray(without)
-    log = log and whole > 0 and np.all(without > 0)
-    if not np.isfinite(whole) or not np.isfinite(without).all():
-        return np.nan, np.nan
-    x = np.log(without) if log else without
-    half = stats.t.ppf(0.975, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
-    if log:
-        return float(whole * np.exp(-half)), float(whole * np.exp(half))
-    return float(whole - half), float(whole + half)
 
 
 def _sd(variance, ends):
@@ -135,10 +122,10 @@ def budget(parameters, condition, y, numerics=None):
     whole = parts(groups)
     without = [parts(groups[:i] + groups[i + 1:]) for i in range(len(groups))]
     out = {"members": len(y), "conditions": len(ids), "mean": whole.mean,
-           "mean_95": _interval(whole.mean, [p.mean for p in without], False)}
+           "mean_95": stat_load.jackknife(whole.mean, [p.mean for p in without])}
     for name in ("fields", "parameters"):
         v = getattr(whole, name)
-        out[name] = _sd(v, _interval(v, [getattr(p, name) for p in without], True))
+        out[name] = _sd(v, stat_load.jackknife(v, [getattr(p, name) for p in without], scale=stat_load.LOG))
     n = out["numerics"] = _numerics(numerics, whole.mean)
     squares = {"fields": np.nan_to_num(whole.fields), "parameters": max(whole.parameters, 0.0),
                "numerics": np.nan_to_num(n["sd"]) ** 2 if n and "sd" in n else 0.0}

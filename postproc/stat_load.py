@@ -14,6 +14,8 @@ the window into it: a peak across the start of the window is in one of the two.
 Fields are independent, samples of a field are not. Means: Student's t over the means of fields. Standard deviation,
 quantiles and rates of all samples together: the jackknife over fields, value +- t se with
     se^2 = (n - 1)/n sum (v_i - v)^2,      v_i the number without field i      [Efron & Tibshirani 1993, ch. 11]
+of standard deviations and rates on the logarithm, of shares on the logit: symmetric intervals of few fields reach to
+where none of these can be. Of a load that is never negative, mean and quantiles have intervals that end at 0.
 Extremes: stat_extreme.py, of all samples, where clusters are told apart by two correlation times of the filtered
 signal, S at least.
 """
@@ -22,6 +24,7 @@ from scipy import stats
 
 import stat_extreme
 import stat_mean
+from bergtow_read import within
 
 QUANTILES = (5, 25, 50, 75, 95, 99)
 LEAST_SCALES = 5      # time scales that a window must hold to be of use
@@ -32,6 +35,8 @@ LEVELS = 16           # of the table of exceedance, from the median to the large
 #: 60 clusters in 92 % and more (README.md)
 CLUSTERS = 60
 BLOCKS = 40
+PLAIN, LOG = (np.asarray, np.asarray), (np.log, np.exp)
+LOGIT = lambda p: np.log(p / (1 - p)), lambda x: 1 / (1 + np.exp(-x))
 LEAST_GAPS = 4        # a block is as many times as long as what separates clusters, or its maxima are not independent
 
 
@@ -48,10 +53,8 @@ def field_of(time, x, start, end, scale):
 
     Samples x [n] are means up to their time. Of x [n, k] each column is filtered by itself, and the largest is taken.
     """
-    slack = 1e-9 * max(1.0, abs(end))
-    before = time < start - slack
-    within = ~before & (time <= end + slack)
-    passed, time, x = (time[before], x[before]), time[within], x[within]
+    there = within(time, start, end)
+    time, x = time[there], x[there]
     if len(time) < 2 or not np.isfinite(x).all():
         return None
     dt = float(np.median(np.diff(time)))
@@ -59,17 +62,23 @@ def field_of(time, x, start, end, scale):
     if len(x) < LEAST_SCALES * n:
         return None
     y = moving_mean(x, n) if n > 1 else x
-    early = (np.concatenate([some, more[:n - 1]]) for some, more in zip(passed, (time, x)))
     return {
         "time": time[n - 1:], "peak": y if y.ndim == 1 else y.max(axis=1), "start": float(time[n - 1]) - dt,
-        "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt, "start_up": start_up(*early, n)
+        "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt
     }
 
 
-def start_up(time, x, n):
-    """The largest mean of n samples in a row, and the time of its last: {"largest", "time_s"}; None where there are not
-    so many, or the load is not there throughout any n of them. The samples: those before the window and the first n - 1
-    in it."""
+def start_up(time, x, start, end, scale):
+    """The largest of the means of field_of that begin before the window, whether that is long enough or not, its time
+    and the time scale in effect: {"largest", "time_s", "scale"}; None where there is none."""
+    there = within(time, -np.inf, end)
+    time, x = time[there], x[there]
+    if len(time) < 2:
+        return None
+    dt = float(np.median(np.diff(time)))
+    n = max(1, int(round(scale / dt)))
+    last = int(np.sum(~within(time, start, np.inf))) + n - 1
+    time, x = time[:last], x[:last]
     if len(x) < n:
         return None
     there = np.isfinite(x)
@@ -77,31 +86,47 @@ def start_up(time, x, n):
     y = np.where(moving_mean(1.0 * ~there, n) > 0.5 / n, -np.inf, y)
     y = y if y.ndim == 1 else y.max(axis=1)
     k = int(np.argmax(y))
-    return {"largest": float(y[k]), "time_s": float(time[n - 1 + k])} if np.isfinite(y[k]) else None
+    return {"largest": float(y[k]), "time_s": float(time[n - 1 + k]), "scale": n * dt} if np.isfinite(y[k]) else None
 
 
-def _jackknife(value, without):
-    """value with its 95 % interval, from what it is without each of the fields; NaN ends for one field."""
-    n = len(without)
-    if n < 2:
-        return {"value": value, "interval_95": (np.nan, np.nan)}
-    se = np.sqrt((n - 1) / n * np.sum((without - np.mean(without)) ** 2))
-    half = stats.t.ppf(0.5 + stat_mean.LEVEL / 2, n - 1) * se
-    return {"value": value, "interval_95": (value - half, value + half)}
+def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
+    """95 % interval of a value between low and high, from what it is without each of the fields; NaN ends for one.
+    scale: (function, its inverse), on which it is symmetric wherever that is finite."""
+    n, without = len(without), np.asarray(without)
+    if n < 2 or not np.isfinite([value, *without]).all():
+        return np.nan, np.nan
+    there, back = scale or PLAIN
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if not np.isfinite(there(np.array([value, *without]))).all():
+            there, back = PLAIN
+    x = there(without)
+    half = stats.t.ppf(0.5 + stat_mean.LEVEL / 2, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
+    return tuple(float(np.clip(back(there(value) + k * half), low, high)) for k in (-1, 1))
 
 
-def over_fields(statistic, samples):
-    """A statistic of the samples of all fields together, samples [fields] of arrays."""
+def over_fields(statistic, samples, low=-np.inf, scale=None):
+    """A statistic of the samples of all fields together, samples [fields] of arrays, with its interval."""
     without = [statistic(np.concatenate(samples[:i] + samples[i + 1:])) for i in range(len(samples))
                ] if len(samples) > 1 else [np.nan]
-    return _jackknife(statistic(np.concatenate(samples)), np.array(without))
+    value = statistic(np.concatenate(samples))
+    return {"value": value, "interval_95": jackknife(value, without, low, np.inf, scale)}
 
 
-def ratio_over_fields(counts, sizes):
-    """Sum of counts / sum of sizes, one of each a field."""
+def ratio_over_fields(counts, sizes, high=np.inf, scale=LOG):
+    """Sum of counts / sum of sizes, one of each a field, with its interval."""
     counts, sizes = np.asarray(counts, dtype=float), np.asarray(sizes, dtype=float)
-    without = (counts.sum() - counts) / np.maximum(sizes.sum() - sizes, 1e-300)
-    return _jackknife(counts.sum() / sizes.sum(), without)
+    without, value = (counts.sum() - counts) / np.maximum(sizes.sum() - sizes, 1e-300), counts.sum() / sizes.sum()
+    return {"value": value, "interval_95": jackknife(value, without, 0.0, high, scale)}
+
+
+def least_of(samples):
+    """What bounds an interval of a load: 0, unless some samples are below."""
+    return 0.0 if all(np.min(x) >= 0 for x in samples) else -np.inf
+
+
+def mean_over_fields(means, low):
+    """Ends of the interval of the mean of fields, no lower than low."""
+    return tuple(np.maximum(stat_mean.t_interval(means), low))
 
 
 def constant(fields):
@@ -124,7 +149,7 @@ def exceedance(fields, gap):
         above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
         clusters = [len(stat_extreme.clusters(f["time"], f["peak"], level, gap)) for f in fields]
         out.append({
-            "level": level, "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields]),
+            "level": level, "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields], 1.0, LOGIT),
             "per_hour": ratio_over_fields(clusters, [f["hours"] for f in fields])
         })
     return out
@@ -133,11 +158,11 @@ def exceedance(fields, gap):
 def summary(fields):
     """Mean, standard deviation, quantiles and largest value, with intervals over fields."""
     samples = [f["peak"] for f in fields]
-    means = np.array([x.mean() for x in samples])
+    means, least = np.array([x.mean() for x in samples]), least_of(samples)
     return {
-        "mean": {"value": means.mean(), "interval_95": stat_mean.t_interval(means)},
-        "sd": over_fields(lambda x: float(np.std(x, ddof=1)), samples),
-        "quantiles": {str(q): over_fields(lambda x, q=q: float(np.percentile(x, q)), samples)
+        "mean": {"value": means.mean(), "interval_95": mean_over_fields(means, least)},
+        "sd": over_fields(lambda x: float(np.std(x, ddof=1)), samples, 0.0, LOG),
+        "quantiles": {str(q): over_fields(lambda x, q=q: float(np.percentile(x, q)), samples, least)
                       for q in QUANTILES}, "largest": max(x.max() for x in samples)
     }
 

@@ -232,9 +232,9 @@ def _of_the_start(case, load):
 
 
 def steps(e, rows):
-    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}).
-    Without a second branch the numbers of the summary are in it, which know the steps between samples and members
-    without their folder."""
+    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}). The
+    numbers of the summary are in it, which know the steps between samples and members without their folder; an earlier
+    program had those of a line without a second branch alone."""
     out, labels = {}, {}
     for m in rows:
         try:
@@ -245,10 +245,14 @@ def steps(e, rows):
         except RunError:
             continue
     out = {name: top for name, top in out.items() if np.isfinite(top)}
-    numbers = np.concatenate([_numbers(e, key, rows) for key in ("peak_line_tension_n", "start_peak_line_tension_n")])
-    top, first = np.fmax.reduce(numbers, initial=-np.inf), f"{loads.TENSION}1"
-    if np.isfinite(top) and set(out) <= {first}:
-        out[first] = max(top, out.get(first, top))
+    first, second = (f"{loads.TENSION}{k}" for k in (1, 2))
+    keys = {name: [f"window_series_{name}_{when}peak_n" for when in ("", "start_")] for name in (first, second)}
+    if set(out) <= {first}:
+        keys[first] += ["peak_line_tension_n", "start_peak_line_tension_n"]
+    for name, some in keys.items():
+        top = np.fmax.reduce(np.concatenate([_numbers(e, key, rows) for key in some]), initial=-np.inf)
+        if np.isfinite(top):
+            out[name] = max(top, out.get(name, top))
     return out, labels
 
 
@@ -310,8 +314,10 @@ def _of_the_models(load):
 def statement(e, rows, c):
     """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "branches",
     "warnings", "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
-    case, found = case_of(e, rows), c["loads"]
-    tow, lines = found.get("tow_force"), branches(e, rows, case, found)
+    there = np.flatnonzero(e.condition == c["index"])
+    towed = e.tows(there, excluded=False)  # those too whose line parted before the window, which are not among the rows
+    case, found = case_of(e, towed), c["loads"]
+    tow, lines = found.get("tow_force"), branches(e, towed, case, found)
     tensions = [(load["design"], load) for load in found.values()
                 if load["applies"].startswith(loads.LINE) and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
@@ -326,7 +332,7 @@ def statement(e, rows, c):
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
-    warned = _of_the_line(e, rows, case, lines) + warned
+    warned = _of_the_line(e, there, case, lines) + warned
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],

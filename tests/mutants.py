@@ -444,7 +444,7 @@ MUTANTS = {
         ("return rest > m->tolerance;", "return false;", "each step a collision of its own"),
         ("while (at < m->n_open) close_event(m, &m->open[at++]);", "", "collisions that end are lost"),
         ("part = t->collision / t->normal;", "part = 1;", "quasi-static loads count as collisions in the force"),
-        ("(t->normal - t->collision) / m->dt", "t->normal / m->dt", "largest quasi-static load with the hit in it"),
+        ("push = t->normal - t->collision +", "push = t->normal +", "largest quasi-static load with the hit in it"),
         ("m->collision_y = s * hit[0] + c * hit[1];", "m->collision_y = s * hit[0] - c * hit[1];",
          "frame of the force"),
         ("(double)(w->step + 1) * w->par.dt", "(double)w->step * w->par.dt", "time of a collision"),

@@ -149,14 +149,15 @@ static void follow_events(bt_impacts *m, double time)
 /// Impulses of the step into panels and sums. c, s: yaw of the body at X1.
 static void add_loads(bt_impacts *m, double c, double s)
 {
-    double hit[2] = {0, 0};
+    double hit[2] = {0, 0}, push = 0;
     m->largest_push = 0;
     for (int64_t i = 0; i < m->n_contacts; i++) {
         const bt_body_contact *t = &m->contact[i];
         const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx,
                      part = t->collision / t->normal;
         hit[0] += part * fx, hit[1] += part * fy;
-        m->largest_push = bt_max(m->largest_push, (t->normal - t->collision) / m->dt);
+        push = t->normal - t->collision + (i > 0 && t[-1].gid == t->gid ? push : 0);
+        m->largest_push = bt_max(m->largest_push, push / m->dt);
         for (int k = 0; k < 2; k++) {
             if (!(t->point[k] > 0)) continue;
             const double share = t->point[k] / t->normal / m->dt;

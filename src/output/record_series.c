@@ -163,7 +163,8 @@ const bt_quantity bt_own_series[] = {
         "largest peak force of these collisions by impact.conversion, 0 without a collision; NaN if not told "
         "apart", NONE, NULL, "impacts.largest.peak_n"),
     SHOWN(largest_push, IMPACTS, MAX, "N",
-        "largest force of a floe on the towed body that is no collision, impulse / dt; NaN if not told apart",
+        "largest normal force of a floe or wall on the towed body that is no collision, impulse / dt; NaN if not told "
+        "apart",
         NONE, NULL, "impacts.largest_push_n"),
     ROW(moving, ALWAYS, LAST, "1", "floes faster than 1 % of the reference speed"),
     // here those of the contact laws: src/contact/crush.c, raft.c

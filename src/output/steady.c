@@ -201,7 +201,7 @@ static void judge_contact(bt_steady *s, const bt_history *h, const bt_run_totals
 }
 
 /// The load that is known worst.
-static void judge_length(bt_steady *s)
+static void judge_length(bt_steady *s, double dt)
 {
     const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
@@ -212,8 +212,7 @@ static void judge_length(bt_steady *s)
     decide(s, BT_TOO_SHORT,
            "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
            "longer",
-           s->end - s->start, worst->mean.n_eff, worst->name,
-           s->n > 1 ? worst->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN, BT_STEADY_INDEPENDENT);
+           (double)s->n * dt, worst->mean.n_eff, worst->name, worst->mean.tau * dt, BT_STEADY_INDEPENDENT);
 }
 
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
@@ -244,5 +243,5 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     judge_events(s, c, t);
     judge_trends(s);
     judge_contact(s, h, t);
-    judge_length(s);
+    judge_length(s, t->dt);
 }

@@ -211,6 +211,18 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       (long long)t->floes_outside);
 }
 
+/// tow.direction is 0 by default and nothing drifts along it: what resists along it is no number of a free body.
+static void without_tow(bt_summary *s, const bt_case *c)
+{
+    if (c->tow.mode != BT_TOW_NONE) return;
+    s->ice.mean = s->ice.se = s->ice.low = s->ice.high = NAN;
+    bt_errors_add(&s->warnings,
+                  "nothing tows the body, so there is no mean ice resistance: all other forces of the summary, and the "
+                  "series of ice_resistance, are those against tow.direction (%g deg), whatever way the body drifts; "
+                  "for the force of the ice read the series ice_force_x and ice_force_y",
+                  c->tow.direction * 180 / BT_PI);
+}
+
 /// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift.
 static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_totals *t)
 {
@@ -247,6 +259,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     reduce_added(s, h);
     if (body) {
         reduce_window(s, h);
+        without_tow(s, c);
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         bt_estimate_conditions(c, &s->estimate);

@@ -82,7 +82,8 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
     printf("  %s\n",
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
-    print_mean("  ice resistance", &s->ice);
+    if (c->tow.mode == BT_TOW_NONE) printf("    ice resistance    none: nothing tows the body\n");
+    else print_mean("  ice resistance", &s->ice);
     printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
            bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;

@@ -24,6 +24,7 @@ import stat_budget  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 from command import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
+from test_loads import SERIES  # noqa: E402
 
 
 def latin(n, k, rng):
@@ -220,6 +221,44 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     found, said = json.loads((folder / "budget.json").read_text()), capsys.readouterr().out
     assert found["mean_95"] == found["fields"]["sd_95"] == [None, None] and found["mean"] > 0
     assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
+
+
+def loaded(folder, parted=None):
+    """A hypercube with a tow force three times the ice resistance, and the force of a floe; the line of member `parted`
+    parts at 200 s."""
+    rng, members = np.random.default_rng(8), []
+    for i in range(20):
+        x, event = 100.0 + 5 * i + rng.random(400), [{"kind": "adrift", "time_s": 200, "subject": 0, "value": 0}]
+        x[200:] -= 90 * (i == parted)
+        more = {"tow_force": 3 * x, "ice_resistance": x, "largest_push": 50 * rng.random(400),
+                "impact_peak": 90 * rng.random(400)}
+        members.append(made_up.member(x, {"ice.friction": (i // 2 + 0.5) / 10}, i // 2, more=more, attributes=SERIES,
+                                      summary={"mean_tow_force_n": 3 * x.mean(), "events": event * (i == parted)}))
+    return Ensemble(made_up.write(folder, members, sampling="latin-hypercube"))
+
+
+def test_numbers_are_those_of_the_loads_and_the_computation_that_of_the_ice_resistance(tmp_path):
+    """The force of one floe is not filtered, as it is not in the statistics; per cent of the ice resistance are none of
+    a tow force."""
+    e = loaded(tmp_path / "a")
+    known = {"sd": 0.01, "biases": {"dt": -0.3}, "unknown": {}}
+    found = budget.of_ensemble(e, "floe_force:99")
+    assert found["mean"] == pytest.approx(np.mean([np.percentile(np.maximum(*(
+        Run(e.folder(m))[name] for name in ("largest_push", "impact_peak"))), 99) for m in range(20)]))
+    assert "moving mean" not in found["meaning"] and "is by half-sine of 0.1 s" in found["meaning"]
+    assert budget.of_ensemble(e, computed=known)["numerics"]["bias"] < -0.3
+    other = budget.of_ensemble(e, "mean_tow_force_n", known)
+    assert other["numerics"] is None
+    assert "knows what the computation adds to the mean ice resistance alone" in budget_text.notes(plain(other))
+
+
+def test_what_comes_after_a_line_parted_is_in_no_budget(tmp_path):
+    e = loaded(tmp_path / "a", parted=3)
+    with pytest.raises(RunError, match="has no tow force: the line parted in 1 of 20 tows"):
+        budget.of_ensemble(e, "tow_force:99")
+    assert budget.of_ensemble(e)["mean"] == pytest.approx(148, rel=0.01)
+    cut = budget.of_ensemble(e, "mean_tow_force_n")
+    assert cut["without_number"] == ["c002-r002"] and np.isnan(cut["mean_95"]).all()
 
 
 def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp_path):

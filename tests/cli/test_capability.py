@@ -316,6 +316,15 @@ def test_a_line_that_parts_is_no_tow(tmp_path):
                            "--resolution", 0.6)
     points = found["conditions"][0]["points"]
     assert points[-1]["parted"] == points[-1]["fields"] and points[-1]["made"] == 0
+    # whenever it parts: no speed nor force of a body that drifts, and the tension by which it parted
+    for p in points:
+        assert sum(x is None for x in p["tow_force"]) == p["parted"] == sum(x is None for x in p["speed"])
+        assert sum(x > 9 for x in p["tension"]) == p["parted"]
+    assert points[-1]["mean_tow_force"] is points[-1]["mean_speed"] is None and points[-1]["mean_tension"] > 9
+    assert "a field has no speed and no tow force" in text
+    axes = capability_text.figure(found).axes[1]
+    assert sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == "x") == sum(
+        p["parted"] for p in points)
     assert "no branch of its line parts" in text and found["breaking_load"] == 9
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -56,6 +57,15 @@ def test_verdicts():
     assert [converge.judged(ends, 0.1, one_sided=True) for ends in ((-0.9, 0.1), (0.2, 9), (-0.5, 3))
             ] == ["none", "matters", "open"]
     assert converge.names_of("width, dt") == ["width", "dt"]
+
+
+def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
+    """What comes after the line parted is no resistance to a tow."""
+    def run(adrift):
+        return SimpleNamespace(window=(10.0, 40.0), adrift=adrift, number=lambda key: 7.0)
+    assert converge.mean_resistance(run(np.inf)) == 7.0 and np.isnan(converge.mean_resistance(run(39.0)))
+    row, = converge.fields_row(SimpleNamespace(kept=lambda *a: True, measured=lambda *a: np.array([7.0, np.nan])))
+    assert converge_text.cells(row)[-1] == "a run has no mean ice resistance"
 
 
 CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20, ice__concentration=0.5)

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -17,6 +18,7 @@ from resuming import assert_same_result, done, killed_after
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import plot_impacts  # noqa: E402
+import report_run  # noqa: E402
 from bergtow_read import Run as Folder  # noqa: E402
 
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
@@ -203,7 +205,7 @@ def test_crushing_and_its_keys(line, tmp_path):
 
 
 def test_the_real_corner_of_a_floe_in_parts(tmp_path):
-    """A spike with a base of 4 m and 7.95 m and 8 m long: its angle is that of the outline, whatever the parts are."""
+    """A spike, 8 m long on a base of 4 m: its angle is that of the outline, whatever the parts are."""
     outline = [[30, -10], [40, -10], [40, 10], [30, 10], [30, 2], [22, 0.05], [30, -2], [30, -10]]
     (tmp_path / "spike.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [{
         "type": "Feature", "properties": {"thickness": 1},
@@ -217,6 +219,17 @@ def test_the_real_corner_of_a_floe_in_parts(tmp_path):
         "impact": {"conversion": "crushing", "corner": "real"}})
     angle = np.arctan2(1.95, 8) + np.arctan2(2.05, 8)
     np.testing.assert_allclose(rows(r)["corner"][0], angle, rtol=1e-6)
+
+
+def test_a_wall_that_is_struck_is_no_floe():
+    """Ids from the number of floes on are those of bodies."""
+    def said(struck):
+        largest = dict.fromkeys(("peak_n", "mean_n", "duration_s", "impulse_ns", "approach_m_s", "time_s"), 1.0)
+        impacts = {"collisions": 3, "collisions_whole_run": 3, "conversion": "", "largest": largest | {"floe": struck}}
+        run = SimpleNamespace(summary={"impacts": impacts}, number=lambda key: 1.0, n_floes=7,
+                              bodies=[SimpleNamespace(name="berg"), SimpleNamespace(name="wall_y1")])
+        return dict(report_run.impacts(run)["rows"])["largest peak"]
+    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8)
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):

@@ -51,17 +51,31 @@ def test_the_filter_by_hand():
     assert filtered.tolist() == [[2, 1], [2, 3], [2, 3], [2, 1], [2, 1]]  # each by itself, then the largest
 
 
+def start_of(*args):
+    found = stat_load.start_up(*args)
+    return found and (found["largest"], found["time_s"])
+
+
 def test_the_start_is_what_lies_before_the_window():
     """Means over the same time that begin before the window; where the load is not there they are passed over."""
     time, x = np.arange(1.0, 15.0), np.array([np.nan, 5, 9, 1, 50, 50, 0, 0, 0, 0, 0, 0, 0, 0])
-    assert stat_load.field_of(time, x, 5.0, 14.0, 1.0)["start_up"] == {"largest": 9, "time_s": 3}
-    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 25.5, "time_s": 5}
-    assert stat_load.field_of(time, x, 4.0, 13.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
-    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] == {"largest": 0, "time_s": 2}
-    assert stat_load.field_of(time, x[::-1], 1.0, 13.0, 2.0)["start_up"] is None  # the first mean is that of the window
-    assert stat_load.start_up(time[:2], np.full(2, np.nan), 1) is None
+    assert start_of(time, x, 5.0, 14.0, 1.0) == (9, 3)
+    assert start_of(time, x, 5.0, 14.0, 2.0) == (25.5, 5)
+    assert start_of(time, x, 4.0, 13.0, 2.0) == (7, 3)
+    assert start_of(time, x[::-1], 2.0, 13.0, 2.0) == (0, 2)
+    assert start_of(time, x[::-1], 1.0, 13.0, 2.0) is None  # the first mean is that of the window
+    assert start_of(time[:2], np.full(2, np.nan), 3.0, 3.0, 1.0) is None
+    assert start_of(time, x, 10.0, 4.0, 2.0) == (7, 3)  # a line that parts before the window
     panels = np.array([[4.0, 0, 4], [1.0, 7, 1]]).T
-    assert stat_load.start_up(time[:3], panels, 2) == {"largest": 4, "time_s": 2}
+    assert start_of(time[:3], panels, 4.0, 4.0, 2.0) == (4, 2)
+
+
+def test_merged_steps_are_in_the_window_as_a_whole_or_not_at_all():
+    """Samples of ten steps: the first that lies in it altogether, and no last one of fewer steps."""
+    time, x = np.array([10.0, 20, 30, 40, 50, 60, 70, 80, 84]), np.array([9.0, 8, 0, 1, 0, 1, 0, 1, 77])
+    f = stat_load.field_of(time, x, 30.0, 84.0, 10.0)
+    assert list(f["peak"]) == [0, 1, 0, 1, 0, 1] and f["hours"] == pytest.approx(60 / 3600)
+    assert start_of(time, x, 30.0, 84.0, 10.0) == (9, 10)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0, 7.0, 30.0])
@@ -72,8 +86,9 @@ def test_every_mean_is_in_the_window_or_in_the_start(scale):
     for start in (80.0, 95.0, 100.0, 115.0, 130.0):
         f = stat_load.field_of(time, x, start, 400.0, scale)
         every = stat_load.moving_mean(x, int(scale))
-        assert max(f["start_up"]["largest"], f["peak"].max()) == pytest.approx(every.max(), rel=1e-12)
-        assert f["start_up"]["time_s"] < f["time"][0]
+        largest, at = start_of(time, x, start, 400.0, scale)
+        assert max(largest, f["peak"].max()) == pytest.approx(every.max(), rel=1e-12)
+        assert at < f["time"][0]
         assert len(f["peak"]) + np.sum(time[int(scale) - 1:] < f["time"][0]) == len(every)
 
 
@@ -93,10 +108,29 @@ def test_intervals_over_fields_are_the_jackknife():
     assert found["value"] == pytest.approx(means.mean()) and found["interval_95"] == pytest.approx(
         stats.t.interval(0.95, 6, means.mean(), stats.sem(means)))
     counts, hours = np.array([3, 0, 4, 4, 9]), np.full(5, 2.0)
-    found = stat_load.ratio_over_fields(counts, hours)
-    assert found["value"] == 2 and found["interval_95"] == pytest.approx(
-        stats.t.interval(0.95, 4, 2, stats.sem(counts / 2)))
+    found, logs = stat_load.ratio_over_fields(counts, hours), np.log((counts.sum() - counts) / 8)
+    assert found["value"] == 2 and found["interval_95"] == pytest.approx(2 * np.exp(
+        np.array([-1, 1]) * stats.t.ppf(0.975, 4) * np.sqrt(4 / 5 * np.sum((logs - logs.mean()) ** 2))))
     assert np.isnan(stat_load.over_fields(np.mean, samples[:1])["interval_95"]).all()
+
+
+def test_no_interval_reaches_where_its_number_cannot_be():
+    """Two fields, of which one has nearly no load: standard deviation and rate are above 0, a load that is never
+    negative not below it, a share of the time within 0 and 1."""
+    rng = np.random.default_rng(5)
+    fields = [{"time": np.arange(1.0, 301), "peak": k * rng.exponential(1e4, 300), "hours": 300 / 3600, "dt": 1.0,
+               "scale": 1.0} for k in (1.0, 0.01)]
+    found = stat_load.summary(fields)
+    for x in (found["sd"], found["mean"], *found["quantiles"].values()):
+        low, high = x["interval_95"]
+        assert 0 <= low <= x["value"] <= high
+    assert found["sd"]["interval_95"][0] > 0
+    for row in stat_load.exceedance(fields, 5.0):
+        low, high = row["share_of_time"]["interval_95"]
+        assert 0 <= low <= row["share_of_time"]["value"] <= high <= 1 and row["per_hour"]["interval_95"][0] >= 0
+    signed = stat_load.summary([f | {"peak": f["peak"] - 1.0} for f in fields])
+    assert signed["mean"]["interval_95"][0] < 0 < signed["sd"]["interval_95"][0]
+    assert stat_load.mean_over_fields(np.array([30.0, 1.0]), 0.0)[0] == 0
 
 
 def test_blocks_of_fields_of_unlike_length():
@@ -551,13 +585,15 @@ def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
 BREAKING = 1.5e6  # N
 
 
-def parting(folder, at, second=None, events=True, fields=10):
-    """Ensemble of tows on a line or, with the tension of a second branch as a factor of that of the first, a bridle.
-    at: {member: [(time s, branch)]} at which branches part; the tow force ends with the last of them."""
+def parting(folder, at, second=None, events=True, fields=10, jerk=None):
+    """Ensemble of tows on a line or, with the tension of a second branch as a factor of that of the first, a bridle,
+    with a collision each 10 s. at: {member: [(time s, branch)]} at which branches part; the tow force ends with the
+    last of them. jerk: {member: N} that come on top at 101 to 150 s."""
     rng, members, n = np.random.default_rng(2), [], 2000
     time, branches = np.arange(1.0, n + 1), 1 if second is None else 2
     for k in range(fields):
         x, broken = made_up.ar1(0.9, n, rng, 1e6, 1e5), dict((b, t) for t, b in at.get(k, []))
+        x += (jerk or {}).get(k, 0) * (abs(time - 125.5) < 25)
         tensions = {b: np.where(time < broken.get(b, np.inf), f * x, 0) for b, f in ((1, 1.0), (2, second)) if f}
         for b, t in broken.items():
             tensions[b][time == t] = 1.1 * BREAKING
@@ -572,7 +608,8 @@ def parting(folder, at, second=None, events=True, fields=10):
         case = CASE.format(pressure=0, load=BREAKING).replace("line:\n", f"line:\n    branches: {branches}\n")
         case = case.replace("ice:\n", f"  branch2:\n    breaking_load: {BREAKING / 2} N\nice:\n", 1)
         members.append(made_up.member(tow, {"ice.concentration": 0.5}, 0, start=301.0, more=series, attributes=SERIES,
-                                      window={"verdict": "not steady" if end < n else "steady"}, case=case, **told))
+                                      window={"verdict": "not steady" if end < n else "steady"}, case=case,
+                                      peaks=(time[304::10], np.ones(170)), hours=1700 / 3600, **told))
     return made_up.write(folder, members)
 
 
@@ -601,6 +638,31 @@ def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
     branch, = c["design"]["branches"]
     assert branch["largest_step"] == 1.1 * BREAKING and branch["breaking_load"] == BREAKING
     assert "2 of 10 members" in next(w for w in warnings_of(s) if w.startswith("members without a tow force"))
+
+
+def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeypatch):
+    """Nor in means, collisions, panels: those of a tow end with it, and where little of the window is left there are
+    none; the start is that of all tows, of those too whose line parts in it."""
+    folder = parting(tmp_path / "a", {0: [(900, 1)], 4: [(200, 1)]}, jerk={4: 4e6})
+    s, text = of_all(folder)
+    e, (c,) = Ensemble(folder), s["conditions"]
+    assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
+    towed = e.series(0)[1][300:900].mean()
+    assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
+    assert c["resistance"]["mean"] == np.mean([e.mean[m] for m in e.used]) and c["resistance"]["min"] > 0.98e6
+    assert c["extremes"]["hours"] == pytest.approx((8 * 1700 + 600) / 3600)
+    assert c["extremes"]["collisions"] == 8 * 170 + 60
+    start = c["loads"]["tow_force"]["start_up"]
+    assert start["largest"] == pytest.approx(5e6, rel=0.02) and 130 <= start["time_s"] <= 150
+    s, _ = of_all(parting(tmp_path / "b", {k: [(200, 1)] for k in range(9)}))
+    assert "the line parted in 9 of 10 tows" in warnings_of(s)[0]  # of which one alone has a mean
+
+    class Hull:
+        panels = {"mean_load": np.array([1.0, 2]), "max_load": np.array([9.0, 9]), "middle": np.ones((2, 2))}
+        panel_series = {"units": "N"}
+        __enter__, __exit__ = lambda self: self, lambda *a: None
+    monkeypatch.setattr(loads, "Run", lambda folder: Hull())
+    assert loads.panels(e, e.used)["fields"] == 8
 
 
 def test_tows_in_which_the_line_parted_are_not_excluded_without_a_word(tmp_path):

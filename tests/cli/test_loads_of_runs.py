@@ -120,6 +120,31 @@ def test_a_bridle_that_loses_a_branch_before_the_window(tmp_path):
     assert rows["breaking load of the line"] == "120 N of branch 2"
 
 
+def test_samples_of_several_steps(tmp_path):
+    """Peaks of a step are those of the summary, a force of which the largest of the steps was kept is no signal, and
+    the window begins with the first sample that lies in it and ends with the last whole one."""
+    write_case(tmp_path, changed(VESSEL, output__sample_every=7, output__panels=False), "base.yml")
+    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": 2}))
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
+    e = Ensemble(tmp_path / "out")
+    c, = ensemble.statistics(e, argparse.Namespace(**report_ensemble.OPTIONS | {"resamples": 1}))["conditions"]
+    assert "of every 7 steps the largest alone was kept" in c["loads_left_out"]["floe_force"]["why"]
+    assert "floe_force" not in c["loads"] and "tow_force" in c["loads"]
+    texts = [json.loads((e.folder(m) / "summary.json").read_text())["window"] for m in range(2)]
+    for row, name in zip(c["design"]["branches"], ("line_tension_1", "line_tension_2")):
+        assert row["largest_step"] == max(text["series"][name][k] for text in texts for k in ("peak_n", "start_peak_n"))
+        with h5py.File(e.folder(0) / "result.h5") as f:
+            assert f[f"series/{name}"][:].max() < row["largest_step"]
+    for m, text in enumerate(texts):
+        time = e.series(m)[0]
+        some = time[np.isin(e.series(m)[1], e.steady(m))]
+        assert 0 <= some[0] - 7 * 0.05 - (text["start_s"] - 0.05) + 1e-9 < 7 * 0.05
+        assert len(time) == 115 and some[-1] == time[-2]  # the last one holds two steps
+    x = c["loads"]["tow_force"]
+    n = round(SCALE / 0.35)
+    assert x["hours"] == pytest.approx(sum(len(e.steady(m)) - n + 1 for m in range(2)) * 0.35 / 3600)
+
+
 def test_tables_pictures_and_answer_have_them(towed):
     e, s = towed
     labels = {x["label"] for x in s["conditions"][0]["loads"].values()}

@@ -107,6 +107,28 @@ def test_a_run_within_its_ramp_has_no_window(tmp_path):
     assert r.summary["mean_tow_force_n"] is None and "window              none" in r.result.stdout
 
 
+def test_the_length_of_a_window_is_that_of_its_steps(tmp_path):
+    """Its start is the end of its first step."""
+    short = run(tmp_path, changed(TOW, run__duration=5, run__dt=0.1, output__window_start=4.5))
+    w = short.summary["window"]
+    assert w["n_samples"] == 6 and w["start_s"] == pytest.approx(4.5) and w["end_s"] == pytest.approx(5)
+    assert "the window of 0.6 s holds" in w["reason"]
+    assert "end of the first step of the window" in call("--list-quantities").stdout
+
+
+def test_without_a_tow_there_is_no_ice_resistance(tmp_path):
+    """The direction of tow is one that nobody chose: a wind from behind would make the resistance negative."""
+    free = changed(TOW, run__duration=10, output__window_start=2, tow={"mode": "none"}, body__vx=-0.3)
+    r = run(tmp_path, free)
+    s = r.summary
+    assert [s[f"mean_ice_resistance{k}_n"] for k in ("", "_se", "_low", "_high")] == [None] * 4
+    assert "ice resistance    none: nothing tows the body" in r.result.stdout
+    said, = [w for w in s["warnings"] if w.startswith("nothing tows the body, so there is no mean ice resistance")]
+    assert "against tow.direction (0 deg)" in said
+    force, resistance = r.series("ice_force_x", "ice_resistance")
+    assert abs(force).max() > 0 and (force == -resistance).all()
+
+
 def test_the_width_of_the_domain_is_reported(tmp_path):
     narrow = changed(BERG, ice__concentration=0.85)
     checked = call("check", write_case(tmp_path, narrow))

@@ -3,6 +3,7 @@
 // panels.
 #include "scene.h"
 
+#include "bergtow/outline.h"
 #include "loads/impact.h"
 #include "output/observe.h"
 
@@ -205,31 +206,38 @@ static void body_against_a_wall(void **state)
     }
 }
 
-/// A floe lies against a body at rest and the wind presses on it: a quasi-static load of that force, never a collision.
+/// A floe lies against a body at rest and the wind presses on it: a quasi-static load of that force, never a collision;
+/// no matter with how many of its parts it lies there.
 static void static_push(void **state)
 {
     (void)state;
-    bt_params p = scene_params(0.1, 1);
-    p.air_u = -20;
-    bt_world *w = bt_world_create(&p);
-    double v[8];
-    scene_square(1, v);
-    bt_body_def d = scene_prism(4, v, sheet);
-    d.x = 0.5, d.drag.air_skin = 0.3;
-    bt_world_add(w, &d);
-    add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.1}, false, 0);
-    w->tow->speed = 0;
-    w->bodies.vel[bt_world_towed(w)].x = w->bodies.vel_start[bt_world_towed(w)].x = 0;
-    bt_impact hit[10];
-    assert_int_equal(run(w, 50, hit), 0);
-    assert_int_equal(w->impacts->n_open, 0);
-    CHECK_CLOSE(largest_push, 0.3 * 400, 1e-6);
-    bt_sample s;
-    bt_observe(w, speed, &s);
-    CHECK_CLOSE(s.ice_resistance, 120, 1e-6);
-    CHECK_CLOSE(s.collision_resistance, 0, 0);
-    CHECK_CLOSE(s.collisions, 0, 0);
-    bt_world_free(w);
+    for (int parts = 1; parts <= 2; parts++) {
+        bt_params p = scene_params(0.1, 1);
+        p.air_u = -20;
+        bt_world *w = bt_world_create(&p);
+        double v[] = {-0.5, 1, -0.5, 0.1, 0, 0, -0.5, -0.1, -0.5, -1, 0.5, -1, 0.5, 1};
+        bt_parts split;
+        if (parts == 1) scene_square(1, v);
+        else assert_true(bt_outline_split(7, v, &split));
+        bt_body_def d = scene_prism(parts == 1 ? 4 : 7, v, sheet);
+        d.parts = parts == 1 ? NULL : &split;
+        d.x = -v[0], d.drag.air_skin = 0.3;
+        bt_world_add(w, &d);
+        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.1}, false, 0);
+        w->tow->speed = 0;
+        w->bodies.vel[bt_world_towed(w)].x = w->bodies.vel_start[bt_world_towed(w)].x = 0;
+        bt_impact hit[10];
+        assert_int_equal(run(w, 50, hit), 0);
+        assert_int_equal(w->impacts->n_open, 0);
+        assert_int_equal(w->impacts->n_contacts, parts);
+        CHECK_CLOSE(largest_push, 0.3 * 400, 1e-6);
+        bt_sample s;
+        bt_observe(w, speed, &s);
+        CHECK_CLOSE(s.ice_resistance, 120, 1e-6);
+        CHECK_CLOSE(s.collision_resistance, 0, 0);
+        CHECK_CLOSE(s.collisions, 0, 0);
+        bt_world_free(w);
+    }
 }
 
 /// A body that speeds up with a floe before it pushes; so does one that squeezes a floe against a wall.
