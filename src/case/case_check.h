@@ -34,6 +34,9 @@ void bt_case_check_environment(const bt_check *k);
 /// = 0 without a body.
 void bt_case_check_lead(const bt_check *k, int n, const double *v);
 
+/// Warn of a lead that drifts away from the tow with its ice, by (x, y) m in the whole run.
+void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings);
+
 /// Length of path that the tow has led along after time t, with ramp or programme, m.
 double bt_case_tow_distance(const bt_case *c, double t);
 

@@ -289,12 +289,13 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
     bt_path_at(path, 0, start, tangent);
     for (int i = 1; i <= TIMES; i++) {
         const double time = c->run.duration * i / TIMES;
+        const double close_x = c->domain.ends_closing * time - slack, close_y = c->domain.sides_closing * time - slack;
         bt_path_at(path, bt_case_tow_distance(c, time), at, tangent);
         for (int j = 0; j < n; j++) {
             const double x = c->body.x + at[0] - start[0] + cy * v[2 * j] - sy * v[2 * j + 1] - c->domain.x0;
             const double y = c->body.y + at[1] - start[1] + sy * v[2 * j] + cy * v[2 * j + 1] - c->domain.y0;
-            if (c->domain.ends == BT_BOUND_WALL && (x < -slack || x > c->domain.length + slack)) return time;
-            if (c->domain.sides == BT_BOUND_WALL && (y < -slack || y > c->domain.width + slack)) return time;
+            if (c->domain.ends == BT_BOUND_WALL && (x < close_x || x > c->domain.length - close_x)) return time;
+            if (c->domain.sides == BT_BOUND_WALL && (y < close_y || y > c->domain.width - close_y)) return time;
         }
     }
     return -1;
@@ -353,7 +354,7 @@ static void check_waypoints(const bt_check *k)
     // A vessel may be slower than its programme, and is not held to it.
     if (c->tow.mode != BT_TOW_THRUST && c->run.duration > 0 && c->body.shape != BT_BODY_ABSENT &&
         bt_check_sound(k, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 "
-                          "domain.y0 domain.ends domain.sides body.shape")) {
+                          "domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing body.shape")) {
         const double time = time_of_wall(c, &path);
         if (time >= 0)
             bt_check_fault(k, "run.duration",
