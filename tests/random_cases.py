@@ -491,6 +491,18 @@ class Scene:
                 v[key] = value
 
 
+def idle(values):
+    """Keys without effect beside the others."""
+    if values["ice.thickness_law"] == "constant":
+        yield "ice.thickness_spread"
+    if "ice.crushing.pressure" not in values:
+        yield "ice.crushing.least_length"
+    if "water.tide.major" not in values:
+        yield from ("water.tide.inclination", "water.tide.phase")
+    if "wall" not in (values["domain.ends"], values["domain.sides"]):
+        yield from ("domain.wall_friction", "domain.wall_restitution")
+
+
 def draw(seed, table):
     """The case of a seed as a nested map; table: what --list-keys --json prints."""
     d = Draw(seed)
@@ -501,8 +513,8 @@ def draw(seed, table):
         if d.chance(0.35):
             values[name] = free_value(d, keys[name], spec)
     values["ice.start"] = d.one(keys["ice.start"]["choices"]) # last: the draws of before stay
-    if values["ice.thickness_law"] == "constant":
-        values.pop("ice.thickness_spread", None) # without effect, and refused
+    for key in idle(values): # without effect, and refused
+        values.pop(key, None)
     case = {}
     for name, value in values.items():
         *sections, key = name.split(".")

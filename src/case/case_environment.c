@@ -69,14 +69,18 @@ static bool along_x(const bt_case *c)
     return along;
 }
 
-void bt_case_check_lead(const bt_check *k, int n, const double *v)
+void bt_case_lead_follow(bt_case *c, int n, const double *v)
 {
-    bt_case *c = k->c;
     const double ahead = c->tow.direction - c->body.yaw;
     if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : 0;
     if (isnan(c->lead.length))
         c->lead.length =
             c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + bt_case_body_length(c, c->tow.direction);
+}
+
+void bt_case_check_lead(const bt_check *k)
+{
+    const bt_case *c = k->c;
     if (c->lead.mode == BT_LEAD_NONE || !bt_check_sound(k, "lead.mode") || !bt_check_sound(k, "body.shape") ||
         !bt_check_sound(k, "tow.mode"))
         return;
@@ -92,8 +96,8 @@ void bt_case_check_lead(const bt_check *k, int n, const double *v)
     if (c->domain.ends == BT_BOUND_MOVING && c->lead.length > c->domain.ahead && !along_x(c) &&
         bt_check_sound(k, "domain.ends domain.length domain.ahead lead.length tow.direction tow.waypoints body.y"))
         bt_check_fault(k, "lead.length",
-                       "%g m is more than domain.ahead, %g m, and the tow is not along x: in a moving window the lead "
-                       "would come round beside it; shorten the lead, tow along x, or set domain.ends: periodic or open",
+                       "%g m is more than domain.ahead, %g m, and the tow leads away from the x axis: in a moving window the "
+                       "lead would come round beside it; shorten the lead, tow along x, or set domain.ends: periodic or open",
                        c->lead.length, c->domain.ahead);
     if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && bt_check_sound(k, "lead.floe_size"))
         bt_check_fault(k, "lead.floe_size",

@@ -11,6 +11,8 @@
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
+static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
+
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
 // ---- speed and way ----
@@ -261,6 +263,39 @@ static void check_lines(const bt_check *k)
         bt_check_fault(k, "tow.line.diameter", "has no effect without a named line; set tow.line.type, or remove it");
 }
 
+/// How far a point lies outside a convex outline, m; within it less than 0.
+static double outside_of(int n, const double *v, double x, double y)
+{
+    double most = -INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), ex = q[0] - p[0], ey = q[1] - p[1];
+        most = bt_max(most, (ey * (x - p[0]) - ex * (y - p[1])) / bt_hypot(ex, ey));
+    }
+    return most;
+}
+
+/// A line is fastened on the hull, or a little beside its waterline.
+static void check_fastening(const bt_check *k)
+{
+    const bt_case *c = k->c;
+    static const char *const key[] = {"tow.hull_x", "tow.branch2.hull_x"},
+                      *const keys[] = {"tow.hull_x tow.hull_y", "tow.branch2.hull_x tow.branch2.hull_y"};
+    const double at[2][2] = {{c->tow.hull_x, c->tow.hull_y}, {c->tow.branch2.hull_x, c->tow.branch2.hull_y}};
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    if (!n || !has_line(c) ||
+        !bt_check_sound(k, "tow.mode body.shape body.length body.width body.vertices tow.line.branches"))
+        return;
+    for (int b = 0; b < c->tow.line.branches; b++) {
+        const double off = outside_of(n, v, at[b][0], at[b][1]);
+        if (off > BESIDE_HULL * 2 * bt_shape_extent(n, v).radius && bt_check_sound(k, keys[b]))
+            bt_check_fault(k, key[b],
+                           "the line is fastened at (%g, %g) m from the centroid of the waterline, %.3g m outside the "
+                           "hull; give a point of the hull in the body's own axes, or leave it out for its outermost",
+                           at[b][0], at[b][1], off);
+    }
+}
+
 static void check_vessel(const bt_check *k)
 {
     const bt_case *c = k->c;
@@ -370,6 +405,7 @@ void bt_case_tow_check(const bt_check *k)
     const bt_case *c = k->c;
     check_programme(k);
     check_lines(k);
+    check_fastening(k);
     check_vessel(k);
     double start[2];
     if (has_line(c) &&
