@@ -414,6 +414,8 @@ class Scene:
                 v["lead.width"] = self.body_length * d.log(0.5, 2)
             if d.chance(0.5):
                 v["lead.length"] = self.length * d.log(0.05, 1)
+            if self.ends == "moving": # beyond its front a lead has to lie along x
+                v["lead.length"] = min(v.get("lead.length", self.length), 0.45 * self.length)
             if mode == "managed":
                 v["lead.floe_size"] = self.size * d.flat(0.3, 1)
 

@@ -75,7 +75,8 @@ void bt_case_lead_follow(bt_case *c, int n, const double *v)
     if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : 0;
     if (isnan(c->lead.length))
         c->lead.length =
-            c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + bt_case_body_length(c, c->tow.direction);
+            c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) +
+                                                         bt_case_body_length(c, c->tow.direction);
 }
 
 void bt_case_check_lead(const bt_check *k)
@@ -96,8 +97,9 @@ void bt_case_check_lead(const bt_check *k)
     if (c->domain.ends == BT_BOUND_MOVING && c->lead.length > c->domain.ahead && !along_x(c) &&
         bt_check_sound(k, "domain.ends domain.length domain.ahead lead.length tow.direction tow.waypoints body.y"))
         bt_check_fault(k, "lead.length",
-                       "%g m is more than domain.ahead, %g m, and the tow leads away from the x axis: in a moving window the "
-                       "lead would come round beside it; shorten the lead, tow along x, or set domain.ends: periodic or open",
+                       "%g m is more than domain.ahead, %g m, and the tow leads away from the x axis: in a moving "
+                       "window the lead would come round beside it; shorten the lead, tow along x, or set domain.ends: "
+                       "periodic or open",
                        c->lead.length, c->domain.ahead);
     if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && bt_check_sound(k, "lead.floe_size"))
         bt_check_fault(k, "lead.floe_size",
@@ -112,7 +114,7 @@ void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings
     const double aside = c->tow.n_waypoints > 0 ? bt_hypot(x, y) : fabs(y * ux - x * uy);
     if (c->lead.mode == BT_LEAD_NONE || !(aside > 0.5 * c->lead.width)) return;
     bt_errors_add(warnings,
-                  "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width of "
-                  "the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",
+                  "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width "
+                  "of the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",
                   aside, c->tow.n_waypoints > 0 ? "against" : "across", c->lead.width);
 }

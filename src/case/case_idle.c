@@ -69,7 +69,8 @@ static void list(const bt_case *c, idle out[RULES])
                                        "tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag "
                                        "tow.vessel.lookahead",
          "tow.mode", "without a vessel, which tow.mode: thrust has"},
-        {c->lead.mode == BT_LEAD_NONE, "lead.width lead.length lead.floe_size", "lead.mode", "without a lead (lead.mode)"},
+        {c->lead.mode == BT_LEAD_NONE, "lead.width lead.length lead.floe_size", "lead.mode",
+         "without a lead (lead.mode)"},
         {c->lead.mode == BT_LEAD_CHANNEL, "lead.floe_size", "lead.mode", "on a channel, in which no pieces are left"},
         {!(c->water.tide.major > 0), "water.tide.inclination water.tide.period water.tide.phase", "water.tide.major",
          "without a tide (water.tide.major)"},

@@ -193,8 +193,9 @@ bt_key bt_case_keys[] = {
      .offset_count = offsetof(bt_case, body.n_vertices),
      .doc =
          "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
-    REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin; of a polygon its extent along x), 0 (geographic)", ANYWHERE,
-         "centroid at time zero"),
+    REAL("body.x", body.x, LENGTH,
+         "= domain.x0 + 2 body.length (basin; of a polygon its extent along x), 0 (geographic)",
+         ANYWHERE, "centroid at time zero"),
     REAL("body.y", body.y, LENGTH, "0 m", ANYWHERE, "centroid at time zero"),
     REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]",
          "angle of the body's own x from the x axis towards y at time zero"),
@@ -317,7 +318,8 @@ bt_key bt_case_keys[] = {
            "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that "
            "reach into it; or those floes cut into pieces"),
     REAL("lead.width", lead.width, LENGTH, "= width of the body across the tow", "[0, 1e5]", "width of the lead"),
-    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length (of a polygon its extent along the tow)", "[0, 1e7]",
+    REAL("lead.length", lead.length, LENGTH,
+         "= length of the tow + body.length (of a polygon its extent along the tow)", "[0, 1e7]",
          "length of the lead from the body's place at time zero"),
     REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]",
          "diameter of the circle of the area of the largest piece, needed by mode managed"),

@@ -114,7 +114,8 @@ static void advance(bt_world *w)
 
 #define WORK_ROUNDING 1e-10 // of the kinetic energy: work of the contacts above it is no rounding
 
-enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE, N_BALANCE };
+enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE,
+       N_BALANCE };
 
 /// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
 static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)

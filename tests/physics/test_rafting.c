@@ -298,8 +298,8 @@ static void apex_under_an_edge(void **state)
     bt_world_free(w);
 }
 
-/// A floe runs against one that is fixed, or free and ten times as thick: no sheet slides over them. Against one that is
-/// twice as thick it does.
+/// A floe runs against one that is fixed, or free and ten times as thick: no sheet slides over them. Against one that
+/// is twice as thick it does.
 static void structures_do_not_raft(void **state)
 {
     (void)state;
