@@ -88,7 +88,7 @@ static inline bt_sample sample(int step)
     bt_sample_set(&s, bt_series_find("crushing"), step % 4 == 0 ? 3 : 0);
     bt_sample_set(&s, bt_series_find("crushed_work"), step % 4 == 0 ? 1.5 : 0);
     bt_sample_set(&s, bt_series_find("crushed_depth"), 0.01);
-    s.repeats = s.outrun = s.restitution_cut = 0;
+    s.added_energy = s.repeats = s.outrun = s.restitution_cut = 0;
     return s;
 }
 

@@ -414,6 +414,8 @@ class Scene:
                 v["lead.width"] = self.body_length * d.log(0.5, 2)
             if d.chance(0.5):
                 v["lead.length"] = self.length * d.log(0.05, 1)
+            if self.ends == "moving": # beyond its front a lead has to lie along x
+                v["lead.length"] = min(v.get("lead.length", self.length), 0.45 * self.length)
             if mode == "managed":
                 v["lead.floe_size"] = self.size * d.flat(0.3, 1)
 
@@ -491,6 +493,18 @@ class Scene:
                 v[key] = value
 
 
+def idle(values):
+    """Keys without effect beside the others."""
+    if values["ice.thickness_law"] == "constant":
+        yield "ice.thickness_spread"
+    if "ice.crushing.pressure" not in values:
+        yield "ice.crushing.least_length"
+    if "water.tide.major" not in values:
+        yield from ("water.tide.inclination", "water.tide.phase")
+    if "wall" not in (values["domain.ends"], values["domain.sides"]):
+        yield from ("domain.wall_friction", "domain.wall_restitution")
+
+
 def draw(seed, table):
     """The case of a seed as a nested map; table: what --list-keys --json prints."""
     d = Draw(seed)
@@ -501,8 +515,8 @@ def draw(seed, table):
         if d.chance(0.35):
             values[name] = free_value(d, keys[name], spec)
     values["ice.start"] = d.one(keys["ice.start"]["choices"]) # last: the draws of before stay
-    if values["ice.thickness_law"] == "constant":
-        values.pop("ice.thickness_spread", None) # without effect, and refused
+    for key in idle(values): # without effect, and refused
+        values.pop(key, None)
     case = {}
     for name, value in values.items():
         *sections, key = name.split(".")

@@ -123,7 +123,7 @@ SCENES = {
     "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "turn_rows": 50, "slop": 5e-3,
                                               "position_sweeps": 1, "rest_speed": 0.05},
                                ice__restitution=0.4, tow__speed=0.5),
-    "guards_wide": changed(CLOSING, run__duration=2, guard={"overlap": 2, "energy": 0, "unconverged": 0,
+    "guards_wide": changed(CLOSING, run__duration=0.7, guard={"overlap": 2, "energy": 0, "unconverged": 0,
                                                             "escape": False}),
     "restitution": changed(DENSE, ice__restitution=0.4, body__restitution=0.2, domain__wall_restitution=0.3,
                            tow__speed=0.5),

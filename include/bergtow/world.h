@@ -199,6 +199,7 @@ typedef struct bt_step_stats {
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
+    bool added_energy;       ///< it is more than 0 by more than the residual and rounding explain
     /// numbers of the program's contact laws, in their order (src/contact/law.h): series, with units and meaning there
     double laws[BT_MAX_LAW_NUMBERS];
     double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of laws that were added

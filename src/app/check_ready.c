@@ -104,12 +104,15 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
             c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / bt_case_reference_speed(c));
 }
 
-/// A moving window takes in ice ahead only; water that is as fast has been refused (case/case_window.c).
+/// A moving window takes in ice ahead only, where water that is as fast has been refused (case/case_window.c); a lead
+/// goes with the ice.
 static void warn_of_drift(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
-    if (c->domain.ends != BT_BOUND_MOVING || n->count < 1 || !(c->tow.speed > 0)) return;
+    if (n->count < 1) return;
     double ice[2], body[2];
     bt_setup_drift(c, n->size, n->thickness, ice, body);
+    bt_case_warn_lead(c, ice[0] * c->run.duration, ice[1] * c->run.duration, warnings);
+    if (c->domain.ends != BT_BOUND_MOVING || !(c->tow.speed > 0)) return;
     const double along = bt_cos(c->tow.direction), drift = along > 0 ? ice[0] : -ice[0];
     if (drift >= c->tow.speed * fabs(along))
         bt_errors_add(warnings,
@@ -129,5 +132,7 @@ void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, b
     bt_case_warn_start(c, warnings);
     bt_case_warn_idle(c, warnings);
     bt_outline_warn(&f->outlines, c, warnings);
+    const double area = f->n > 0 ? f->concentration * f->ice_area : bt_case_made_area(c);
+    bt_ice_warn_closed(c, area + bt_case_area_by_hand(c), warnings);
     if (n->count >= 1) bt_ice_warn(c, n->size, n->thickness, warnings);
 }

@@ -85,9 +85,9 @@ static void follow_start(bool drifts, double *vx, double *vy)
     bt_check_fill(vy, 0);
 }
 
-static void follow(const check *k)
+/// Numbers of domain, ice and body.
+static void follow_numbers(bt_case *c)
 {
-    bt_case *c = k->c;
     bool basin = c->domain.frame == BT_FRAME_BASIN;
     if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
     bt_check_fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
@@ -97,11 +97,17 @@ static void follow(const check *k)
     bt_check_fill(&c->ice.y_min, c->domain.y0);
     bt_check_fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
     bt_check_fill(&c->body.width, c->body.length);
-    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * c->body.length : 0);
+    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * bt_case_body_length(c, 0) : 0);
     bt_check_fill(&c->domain.ahead, bt_case_window_ahead(c));
     bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
     bt_check_fill(&c->body.friction, c->ice.friction);
     bt_check_fill(&c->body.restitution, c->ice.restitution);
+}
+
+static void follow(const check *k)
+{
+    bt_case *c = k->c;
+    follow_numbers(c);
     const bool drift = c->ice.start == BT_START_DRIFT;
     follow_start(drift && c->tow.mode == BT_TOW_NONE && c->body.shape != BT_BODY_ABSENT, &c->body.vx, &c->body.vy);
     for (bt_idx i = 0; i < c->n_floes; i++) {
@@ -112,6 +118,17 @@ static void follow(const check *k)
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
+}
+
+void bt_case_fill(bt_case *c)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    follow_numbers(c);
+    bt_case_tow_follow(&(check){.c = c});
+    bt_case_tow_hull(c, n, v);
+    bt_case_tow_ramp(c);
+    bt_case_lead_follow(c, n, v);
 }
 
 // ---- checks ----
@@ -396,6 +413,22 @@ static void check_tow(const check *k)
                 "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
 }
 
+/// Way of the tow after which the body meets a wall, `room` ahead of it at the start, that comes with this speed;
+/// INFINITY: not within the run. towards: cosine of the angle between the course and the way to the wall.
+static double way_to_wall(const bt_case *c, double room, double towards, double closing)
+{
+    double early = 0, late = c->run.duration;
+    const double slack = 1e-9 * (c->domain.length + c->domain.width);
+    if (!(towards > 0) || towards * bt_case_tow_distance(c, late) + closing * late <= room + slack) return INFINITY;
+    if (closing == 0) return bt_max(0, room / towards);
+    for (int k = 0; k < 60; k++) {
+        const double middle = 0.5 * (early + late);
+        if (towards * bt_case_tow_distance(c, middle) + closing * middle <= room) early = middle;
+        else late = middle;
+    }
+    return bt_case_tow_distance(c, early);
+}
+
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
 static void check_path(const check *k, int n, const double *v)
 {
@@ -404,22 +437,21 @@ static void check_path(const check *k, int n, const double *v)
     // vessel may be slower. way-points: case_tow.c
     const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0;
     if (!straight || !(c->run.duration > 0) ||
-        !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme"))
+        !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme domain.ends_closing "
+                           "domain.sides_closing"))
         return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
-    double x = c->body.x + way * ux, y = c->body.y + way * uy;
-    box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
-    double reach = way, slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (c->domain.ends == BT_BOUND_WALL && b.x_max > c->domain.x0 + c->domain.length + slack)
-        reach = bt_min(reach, (c->domain.x0 + c->domain.length - start.x_max) / ux);
-    if (c->domain.ends == BT_BOUND_WALL && b.x_min < c->domain.x0 - slack)
-        reach = bt_min(reach, (c->domain.x0 - start.x_min) / ux);
-    if (c->domain.sides == BT_BOUND_WALL && b.y_max > c->domain.y0 + c->domain.width + slack)
-        reach = bt_min(reach, (c->domain.y0 + c->domain.width - start.y_max) / uy);
-    if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack)
-        reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
-    if (reach >= way) return;
-    reach = bt_max(reach, 0);
+    const box b = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
+    double reach = INFINITY;
+    if (c->domain.ends == BT_BOUND_WALL) {
+        reach = bt_min(reach, way_to_wall(c, c->domain.x0 + c->domain.length - b.x_max, ux, c->domain.ends_closing));
+        reach = bt_min(reach, way_to_wall(c, b.x_min - c->domain.x0, -ux, c->domain.ends_closing));
+    }
+    if (c->domain.sides == BT_BOUND_WALL) {
+        reach = bt_min(reach, way_to_wall(c, c->domain.y0 + c->domain.width - b.y_max, uy, c->domain.sides_closing));
+        reach = bt_min(reach, way_to_wall(c, b.y_min - c->domain.y0, -uy, c->domain.sides_closing));
+    }
+    if (isinf(reach)) return;
     const double time = bt_case_tow_time(c, reach);
     bt_check_fault(k, "run.duration",
                    "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
@@ -535,7 +567,8 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_check_window(&k, n, v);
     check_water(&k);
     bt_case_check_environment(&k);
-    bt_case_check_lead(&k, n, v);
+    bt_case_lead_follow(c, n, v);
+    bt_case_check_lead(&k);
     check_estimate(&k);
     for (bt_idx i = 0; i < c->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&k, i);
     if (err->n == before) bt_case_check_cost(&k);

@@ -20,6 +20,9 @@ static inline void bt_check_fill(double *member, double value)
     if (isnan(*member)) *member = value;
 }
 
+/// The defaults of numbers that follow from other keys, of a case whose shapes are sound.
+void bt_case_fill(bt_case *c);
+
 /// Absolute path of a file that is named in the file `from`, to whose folder it is relative; NULL where it is absolute,
 /// or that folder is not there.
 char *bt_case_named_file(const char *from, const char *file);
@@ -30,9 +33,14 @@ bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
 /// Checks of current and wind in time.
 void bt_case_check_environment(const bt_check *k);
 
-/// Width and length of the lead that follow from the body and the tow; checks of the lead. The waterline is v [n][2], n
-/// = 0 without a body.
-void bt_case_check_lead(const bt_check *k, int n, const double *v);
+/// Width and length of the lead that follow from the body and the tow. The waterline is v [n][2], n = 0 without a body.
+void bt_case_lead_follow(bt_case *c, int n, const double *v);
+
+/// Checks of the lead.
+void bt_case_check_lead(const bt_check *k);
+
+/// Warn of a lead that drifts away from the tow with its ice, by (x, y) m in the whole run.
+void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings);
 
 /// Length of path that the tow has led along after time t, with ramp or programme, m.
 double bt_case_tow_distance(const bt_case *c, double t);

@@ -32,6 +32,15 @@ int bt_case_waterline(const bt_case *c, double *v)
     return bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, NULL);
 }
 
+double bt_case_body_length(const bt_case *c, double angle)
+{
+    if (c->body.shape != BT_BODY_POLYGON) return c->body.length;
+    double v[2 * BT_MAX_VERTICES] = {0};
+    const int n = bt_case_waterline(c, v);
+    const double along = angle - c->body.yaw;
+    return n ? bt_shape_width(n, v, -bt_sin(along), bt_cos(along)) : 0;
+}
+
 int bt_case_floe_outline(const bt_floe_def *f, double *v)
 {
     return bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
@@ -68,7 +77,7 @@ bool bt_case_key_is_idle(const bt_case *c, const char *key)
     return false;
 }
 
-double bt_case_expected_floes(const bt_case *c)
+double bt_case_made_area(const bt_case *c)
 {
     if (bt_case_reads_field(c)) return 0;
     double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
@@ -83,7 +92,23 @@ double bt_case_expected_floes(const bt_case *c)
             (n = bt_case_floe_outline(f, v)))
             area -= bt_shape_moments(n, v).area;
     }
-    return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
+    return bt_max(0, c->ice.concentration * area);
+}
+
+double bt_case_area_by_hand(const bt_case *c)
+{
+    double area = 0, v[2 * BT_MAX_VERTICES];
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const int n = bt_case_floe_outline(&c->floes[i], v);
+        if (n) area += bt_shape_moments(n, v).area;
+    }
+    return area;
+}
+
+double bt_case_expected_floes(const bt_case *c)
+{
+    if (bt_case_reads_field(c)) return 0;
+    return bt_max(0, bt_case_made_area(c) / (BT_PI / 4 * mean_square_size(c)));
 }
 
 int64_t bt_case_steps(const bt_case *c)

@@ -10,6 +10,9 @@
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                     const char **why);
 
+/// Length of the body: of a named shape body.length, of a polygon its extent in the direction at this angle from x, m.
+double bt_case_body_length(const bt_case *c, double angle);
+
 #define BT_GRAVITY 9.81 ///< m/s²
 
 /// What sheets on each other gain in potential energy, over the area and the square of their thickness, Pa/m
@@ -27,6 +30,13 @@ bool bt_case_ice_is_random(const bt_case *c);
 
 /// Is this a key of how ice is made, of no effect on that of this case, which is read?
 bool bt_case_key_is_idle(const bt_case *c, const char *key);
+
+/// Area of the ice that is made, concentration × ice region less body and floes given by hand, m²; 0 without a
+/// generator.
+double bt_case_made_area(const bt_case *c);
+
+/// Area of the floes given by hand, m².
+double bt_case_area_by_hand(const bt_case *c);
 
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);

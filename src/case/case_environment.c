@@ -68,14 +68,28 @@ void bt_case_check_environment(const bt_check *k)
     check_table(k, "air.wind_table", &c->air.table, wind);
 }
 
-void bt_case_check_lead(const bt_check *k, int n, const double *v)
+/// Does the tow keep its place across x? Then what it leads through goes round a moving window as it is.
+static bool along_x(const bt_case *c)
 {
-    bt_case *c = k->c;
+    bool along = fabs(bt_sin(c->tow.direction)) <= 1e-9;
+    for (int i = 0; i < c->tow.n_waypoints; i++)
+        along = along && fabs(c->tow.waypoints[2 * i + 1] - c->body.y) <= 1e-9 * c->domain.width;
+    return along;
+}
+
+void bt_case_lead_follow(bt_case *c, int n, const double *v)
+{
     const double ahead = c->tow.direction - c->body.yaw;
     if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : 0;
     if (isnan(c->lead.length))
         c->lead.length =
-            c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;
+            c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) +
+                                                         bt_case_body_length(c, c->tow.direction);
+}
+
+void bt_case_check_lead(const bt_check *k)
+{
+    const bt_case *c = k->c;
     if (c->lead.mode == BT_LEAD_NONE || !bt_check_sound(k, "lead.mode") || !bt_check_sound(k, "body.shape") ||
         !bt_check_sound(k, "tow.mode"))
         return;
@@ -88,8 +102,27 @@ void bt_case_check_lead(const bt_check *k, int n, const double *v)
         bt_check_fault(k, "lead.width", "is %g m; give the width of the lead, as in 20 m", c->lead.width);
     if (!(c->lead.length > 0) && bt_check_sound(k, "lead.length"))
         bt_check_fault(k, "lead.length", "is %g m; give the length of the lead, as in 500 m", c->lead.length);
+    if (c->domain.ends == BT_BOUND_MOVING && c->lead.length > c->domain.ahead && !along_x(c) &&
+        bt_check_sound(k, "domain.ends domain.length domain.ahead lead.length tow.direction tow.waypoints body.y"))
+        bt_check_fault(k, "lead.length",
+                       "%g m is more than domain.ahead, %g m, and the tow leads away from the x axis: in a moving "
+                       "window the lead would come round beside it; shorten the lead, tow along x, or set domain.ends: "
+                       "periodic or open",
+                       c->lead.length, c->domain.ahead);
     if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && bt_check_sound(k, "lead.floe_size"))
         bt_check_fault(k, "lead.floe_size",
                        "is %g m and a managed lead needs the size of its pieces; give it, as in 10 m",
                        c->lead.floe_size);
+}
+
+// The lead is cut at time zero and goes with the ice, the planned path does not.
+void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings)
+{
+    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
+    const double aside = c->tow.n_waypoints > 0 ? bt_hypot(x, y) : fabs(y * ux - x * uy);
+    if (c->lead.mode == BT_LEAD_NONE || !(aside > 0.5 * c->lead.width)) return;
+    bt_errors_add(warnings,
+                  "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width "
+                  "of the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",
+                  aside, c->tow.n_waypoints > 0 ? "against" : "across", c->lead.width);
 }

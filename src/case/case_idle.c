@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Keys of the ice that have no effect beside what another key says.
+// Keys that have no effect beside what another key says.
 //
 // Who gives both in one file contradicts himself, and is refused. Where they come from different places, the key may be
 // inherited, from a base or from the case that a study or --set changes: then the run says that it was not used. A
@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "case/case_derived.h"
+#include "case/case_check.h"
 #include "case/schema.h"
 
 enum { LONGEST_NAME = 64 };
@@ -19,17 +19,23 @@ enum { LONGEST_NAME = 64 };
 typedef struct idle {
     bool so;
     const char *keys;  ///< separated by blanks
-    const char *cause; ///< the key that makes them so
+    const char *cause; ///< the keys that make them so, separated by blanks
     const char *why;   ///< completes "has no effect "
 } idle;
 
-enum { RULES = 10 };
+#define BRANCH2                                                                                                        \
+    "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
+    "tow.branch2.breaking_load"
+
+enum { RULES = 18 };
 
 static void list(const bt_case *c, idle out[RULES])
 {
     const bool read = bt_case_reads_field(c), power = c->ice.size_law == BT_SIZE_POWER;
     // a moving window has its room in floes of ice.size, whatever the ice (case_window.c)
     const bool sized = c->domain.ends == BT_BOUND_MOVING;
+    const bool line = c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST;
+    const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
     const char *source = c->ice.field ? "ice.field" : "ice.outlines";
     const idle all[RULES] = {
         {read, "ice.concentration ice.shape ice.sides ice.aspect ice.size_law ice.size_spread ice.size_min "
@@ -53,46 +59,69 @@ static void list(const bt_case *c, idle out[RULES])
                 : c->ice.shape == BT_ICE_POLYGONS ? "ice.aspect"
                                                   : "ice.sides ice.aspect",
          "ice.shape", "on floes of this ice.shape"},
+        {!(c->ice.crushing_pressure > 0), "ice.crushing.least_length", "ice.crushing.pressure",
+         "on ice that is not crushed (ice.crushing.pressure)"},
+        {!line, "tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type "
+                "tow.line.diameter tow.line.branches tow.line.breaking_load " BRANCH2,
+         "tow.mode", "without a line, which tow.mode: line and thrust have"},
+        {line && c->tow.line.branches < 2, BRANCH2, "tow.line.branches", "on a single line (tow.line.branches)"},
+        {c->tow.mode != BT_TOW_THRUST, "tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull "
+                                       "tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag "
+                                       "tow.vessel.lookahead",
+         "tow.mode", "without a vessel, which tow.mode: thrust has"},
+        {c->lead.mode == BT_LEAD_NONE, "lead.width lead.length lead.floe_size", "lead.mode",
+         "without a lead (lead.mode)"},
+        {c->lead.mode == BT_LEAD_CHANNEL, "lead.floe_size", "lead.mode", "on a channel, in which no pieces are left"},
+        {!(c->water.tide.major > 0), "water.tide.inclination water.tide.period water.tide.phase", "water.tide.major",
+         "without a tide (water.tide.major)"},
+        {!walls, "domain.wall_friction domain.wall_restitution", "domain.ends domain.sides",
+         "without walls (domain.ends, domain.sides)"},
     };
     memcpy(out, all, sizeof all);
 }
 
-static bool is_changed(const bt_case *c, const bt_case *defaults, const char *name)
+static const bt_key *row_of(const char *key)
 {
-    const bt_key *k = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
-    const size_t size = k->type == BT_KEY_REAL  ? sizeof(double)
-                        : k->type == BT_KEY_INT ? sizeof(int64_t)
-                                                : sizeof(int);
-    return memcmp((const char *)c + k->offset, (const char *)defaults + k->offset, size) != 0;
+    return &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, key)];
+}
+
+static size_t size_of(const bt_key *k)
+{
+    return k->type == BT_KEY_REAL ? sizeof(double) : k->type == BT_KEY_INT ? sizeof(int64_t) : sizeof(int);
+}
+
+/// A case with a key of a number or a choice at its default, all others as they are. No memory of its own.
+static bt_case with_default(const bt_case *c, const bt_key *k)
+{
+    bt_case d = *c;
+    bt_schema_preset(k, 1, &d);
+    bt_case_fill(&d);
+    return d;
 }
 
 bool bt_case_changed(const bt_case *c, const char *key)
 {
-    bt_case defaults = {0};
-    bt_schema_preset(bt_case_keys, bt_n_case_keys, &defaults);
-    const bool changed = is_changed(c, &defaults, key);
-    bt_schema_release(bt_case_keys, bt_n_case_keys, &defaults);
-    return changed;
+    const bt_key *k = row_of(key);
+    const void *at = (const char *)c + k->offset;
+    double value = 0;
+    if (k->type == BT_KEY_REAL) memcpy(&value, at, sizeof value);
+    const bt_case d = with_default(c, k);
+    return !isnan(value) && memcmp(at, (const char *)&d + k->offset, size_of(k)) != 0;
 }
 
 /// Calls found for each key that is not used although its value is not the default.
 static void look(const bt_case *c, void (*found)(void *to, const char *key, const idle *r), void *to)
 {
     idle rules[RULES];
-    bt_case defaults = {0};
     list(c, rules);
-    bt_schema_preset(bt_case_keys, bt_n_case_keys, &defaults);
-    defaults.ice.x_min = c->domain.x0, defaults.ice.x_max = c->domain.x0 + c->domain.length;
-    defaults.ice.y_min = c->domain.y0, defaults.ice.y_max = c->domain.y0 + c->domain.width;
     for (int i = 0; i < RULES; i++)
         for (const char *keys = rules[i].keys; rules[i].so && *keys; keys += strspn(keys, " ")) {
             char name[LONGEST_NAME];
             const size_t n = strcspn(keys, " ");
             snprintf(name, sizeof name, "%.*s", (int)n, keys);
             keys += n;
-            if (is_changed(c, &defaults, name)) found(to, name, &rules[i]);
+            if (bt_case_changed(c, name)) found(to, name, &rules[i]);
         }
-    bt_schema_release(bt_case_keys, bt_n_case_keys, &defaults);
 }
 
 /// Does the file in which the key stands have more than half of all keys? Nobody writes so many by hand.
@@ -107,9 +136,16 @@ static bool says_all(const bt_check *k, const char *key)
 static void refuse(void *to, const char *key, const idle *r)
 {
     const bt_check *k = to;
-    if (says_all(k, key)) return;
-    if (!bt_check_sound(k, key) || !bt_check_sound(k, r->cause) || !bt_check_together(k, key, r->cause)) return;
-    bt_check_fault(k, key, "has no effect %s; remove the key, or change %s", r->why, r->cause);
+    if (says_all(k, key) || !bt_check_sound(k, key) || !bt_check_sound(k, r->cause)) return;
+    for (const char *causes = r->cause; *causes; causes += strspn(causes, " ")) {
+        char cause[LONGEST_NAME];
+        const size_t n = strcspn(causes, " ");
+        snprintf(cause, sizeof cause, "%.*s", (int)n, causes);
+        causes += n;
+        if (!bt_check_together(k, key, cause)) return;
+    }
+    bt_check_fault(k, key, "has no effect %s; remove the key, or change %.*s", r->why,
+                   (int)strcspn(r->cause, " "), r->cause);
 }
 
 void bt_case_check_idle(const bt_check *k)
@@ -145,3 +181,14 @@ void bt_case_warn_idle(const bt_case *c, bt_errors *warnings)
     look(c, gather, &w);
     put(&w);
 }
+
+static void put_default(void *to, const char *key, const idle *r)
+{
+    (void)r;
+    bt_case *c = to;
+    const bt_key *k = row_of(key);
+    const bt_case d = with_default(c, k);
+    memcpy((char *)c + k->offset, (const char *)&d + k->offset, size_of(k));
+}
+
+void bt_case_drop_idle(bt_case *c) { look(c, put_default, c); }

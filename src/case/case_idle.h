@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Keys of the ice that have no effect beside what another key says.
+// Keys that have no effect beside what another key says.
 #ifndef BERGTOW_CASE_IDLE_H
 #define BERGTOW_CASE_IDLE_H
 
@@ -11,7 +11,10 @@ void bt_case_check_idle(const bt_check *k);
 /// Warn of the others, which a base or a study may have brought along.
 void bt_case_warn_idle(const bt_case *c, bt_errors *warnings);
 
-/// Has a key of a number or a choice another value than its default?
+/// Give them their defaults.
+void bt_case_drop_idle(bt_case *c);
+
+/// Has a key of a number or a choice another value than its default, which others may set?
 bool bt_case_changed(const bt_case *c, const char *key);
 
 #endif

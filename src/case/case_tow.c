@@ -11,6 +11,8 @@
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
+static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
+
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
 // ---- speed and way ----
@@ -261,6 +263,39 @@ static void check_lines(const bt_check *k)
         bt_check_fault(k, "tow.line.diameter", "has no effect without a named line; set tow.line.type, or remove it");
 }
 
+/// How far a point lies outside a convex outline, m; within it less than 0.
+static double outside_of(int n, const double *v, double x, double y)
+{
+    double most = -INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), ex = q[0] - p[0], ey = q[1] - p[1];
+        most = bt_max(most, (ey * (x - p[0]) - ex * (y - p[1])) / bt_hypot(ex, ey));
+    }
+    return most;
+}
+
+/// A line is fastened on the hull, or a little beside its waterline.
+static void check_fastening(const bt_check *k)
+{
+    const bt_case *c = k->c;
+    static const char *const key[] = {"tow.hull_x", "tow.branch2.hull_x"},
+                      *const keys[] = {"tow.hull_x tow.hull_y", "tow.branch2.hull_x tow.branch2.hull_y"};
+    const double at[2][2] = {{c->tow.hull_x, c->tow.hull_y}, {c->tow.branch2.hull_x, c->tow.branch2.hull_y}};
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    if (!n || !has_line(c) ||
+        !bt_check_sound(k, "tow.mode body.shape body.length body.width body.vertices tow.line.branches"))
+        return;
+    for (int b = 0; b < c->tow.line.branches; b++) {
+        const double off = outside_of(n, v, at[b][0], at[b][1]);
+        if (off > BESIDE_HULL * 2 * bt_shape_extent(n, v).radius && bt_check_sound(k, keys[b]))
+            bt_check_fault(k, key[b],
+                           "the line is fastened at (%g, %g) m from the centroid of the waterline, %.3g m outside the "
+                           "hull; give a point of the hull in the body's own axes, or leave it out for its outermost",
+                           at[b][0], at[b][1], off);
+    }
+}
+
 static void check_vessel(const bt_check *k)
 {
     const bt_case *c = k->c;
@@ -289,12 +324,13 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
     bt_path_at(path, 0, start, tangent);
     for (int i = 1; i <= TIMES; i++) {
         const double time = c->run.duration * i / TIMES;
+        const double close_x = c->domain.ends_closing * time - slack, close_y = c->domain.sides_closing * time - slack;
         bt_path_at(path, bt_case_tow_distance(c, time), at, tangent);
         for (int j = 0; j < n; j++) {
             const double x = c->body.x + at[0] - start[0] + cy * v[2 * j] - sy * v[2 * j + 1] - c->domain.x0;
             const double y = c->body.y + at[1] - start[1] + sy * v[2 * j] + cy * v[2 * j + 1] - c->domain.y0;
-            if (c->domain.ends == BT_BOUND_WALL && (x < -slack || x > c->domain.length + slack)) return time;
-            if (c->domain.sides == BT_BOUND_WALL && (y < -slack || y > c->domain.width + slack)) return time;
+            if (c->domain.ends == BT_BOUND_WALL && (x < close_x || x > c->domain.length - close_x)) return time;
+            if (c->domain.sides == BT_BOUND_WALL && (y < close_y || y > c->domain.width - close_y)) return time;
         }
     }
     return -1;
@@ -353,7 +389,7 @@ static void check_waypoints(const bt_check *k)
     // A vessel may be slower than its programme, and is not held to it.
     if (c->tow.mode != BT_TOW_THRUST && c->run.duration > 0 && c->body.shape != BT_BODY_ABSENT &&
         bt_check_sound(k, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 "
-                          "domain.y0 domain.ends domain.sides body.shape")) {
+                          "domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing body.shape")) {
         const double time = time_of_wall(c, &path);
         if (time >= 0)
             bt_check_fault(k, "run.duration",
@@ -369,6 +405,7 @@ void bt_case_tow_check(const bt_check *k)
     const bt_case *c = k->c;
     check_programme(k);
     check_lines(k);
+    check_fastening(k);
     check_vessel(k);
     double start[2];
     if (has_line(c) &&

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "case/case_idle.h"
 #include "case/schema.h"
 #include "case/value.h"
 
@@ -123,6 +124,7 @@ bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
     // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
     c->tow.line.type = BT_ROPE_NUMBERS;
     c->tow.line.diameter = 0;
+    bt_case_drop_idle(c); // a default that was scaled would look like a value that somebody gave
     return bt_case_finish(c, err);
 }
 

@@ -138,6 +138,28 @@ const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT
     return bt_ice_field_fault(false, f->n, size, f->concentration * f->ice_area, f->ice_area, why);
 }
 
+double bt_ice_closed(const bt_case *c, double area)
+{
+    const double x = 2 * c->domain.ends_closing * c->run.duration, y = 2 * c->domain.sides_closing * c->run.duration;
+    const bool leaves = c->domain.ends == BT_BOUND_OPEN || c->domain.sides == BT_BOUND_OPEN;
+    if ((x == 0 && y == 0) || leaves || c->ice.rafting_kappa > 0 || c->ice.crushing_pressure > 0) return 0;
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    const double body = n ? bt_shape_moments(n, v).area : 0;
+    return area / ((c->domain.length - x) * (c->domain.width - y) - body);
+}
+
+void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings)
+{
+    const double closed = bt_ice_closed(c, area);
+    if (!(closed >= c->estimate.phi_j)) return;
+    bt_errors_add(warnings,
+                  "domain.%s_closing: the walls bring the ice to a concentration of %.3g by the end of the run, packed "
+                  "from %g on (estimate.phi_j): rigid floes then bear any load; end the run before, or set "
+                  "ice.crushing.pressure or ice.rafting.kappa",
+                  c->domain.ends_closing > 0 ? "ends" : "sides", closed, c->estimate.phi_j);
+}
+
 static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice is seldom so thick, assumed
 
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings)

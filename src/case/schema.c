@@ -193,18 +193,19 @@ bt_key bt_case_keys[] = {
      .offset_count = offsetof(bt_case, body.n_vertices),
      .doc =
          "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
-    REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin), 0 (geographic)", ANYWHERE,
-         "centroid at time zero"),
+    REAL("body.x", body.x, LENGTH,
+         "= domain.x0 + 2 body.length (basin; of a polygon its extent along x), 0 (geographic)",
+         ANYWHERE, "centroid at time zero"),
     REAL("body.y", body.y, LENGTH, "0 m", ANYWHERE, "centroid at time zero"),
     REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]",
          "angle of the body's own x from the x axis towards y at time zero"),
     REAL("body.vx", body.vx, SPEED, "none", ANY_SPEED,
-         "velocity at time zero, tow modes none and line; none: 0, or free drift in mode none without body.vy "
+         "velocity at time zero, in every tow mode but speed; none: 0, or free drift in mode none without body.vy "
          "(ice.start)"),
     REAL("body.vy", body.vy, SPEED, "none", ANY_SPEED,
-         "velocity at time zero, tow modes none and line; none: as body.vx"),
+         "velocity at time zero, in every tow mode but speed; none: as body.vx"),
     REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]",
-         "rate of turn at time zero, tow modes none and line"),
+         "rate of turn at time zero, in every tow mode but speed"),
     REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]",
          "depth below the waterline; no default in the geographic frame; assumed"),
     REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]",
@@ -317,7 +318,8 @@ bt_key bt_case_keys[] = {
            "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that "
            "reach into it; or those floes cut into pieces"),
     REAL("lead.width", lead.width, LENGTH, "= width of the body across the tow", "[0, 1e5]", "width of the lead"),
-    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length", "[0, 1e7]",
+    REAL("lead.length", lead.length, LENGTH,
+         "= length of the tow + body.length (of a polygon its extent along the tow)", "[0, 1e7]",
          "length of the lead from the body's place at time zero"),
     REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]",
          "diameter of the circle of the area of the largest piece, needed by mode managed"),
@@ -486,7 +488,8 @@ const bt_key bt_floe_keys[] = {
     REAL("vy", vy, SPEED, "none", ANY_SPEED, "velocity at time zero; none: as vx"),
     REAL("yaw_rate", yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero"),
     REAL("thickness", thickness, LENGTH, "= ice.thickness", "(0, 100]", "thickness"),
-    BOOL("fixed", fixed, "false", "at rest for ever, as a structure or grounded ice"),
+    BOOL("fixed", fixed, "false",
+         "at rest for ever, as a structure or grounded ice; floes do not raft on it (ice.rafting.kappa)"),
 };
 const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
 

@@ -57,6 +57,7 @@ static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
     own[BT_RAFT_LINE] = c->ice.rafting_kappa * 0.5 * rise;
     own[BT_RAFT_SHEET] = (c->water.density - c->ice.density) * BT_GRAVITY;
     own[BT_RAFT_RISE] = rise;
+    own[BT_RAFT_FREEBOARD] = 1 - c->ice.density / c->water.density;
 }
 
 static bool on(const double *own) { return own[BT_RAFT_LINE] > 0; }
@@ -85,14 +86,19 @@ static char *result(const bt_case *c, const bt_total_value *total, double ice_ar
 
 static const double *own_of(const bt_world *w) { return w->par.law_own[BT_LAW_RAFTING]; }
 
-static bool applies(const bt_world *w, bt_idx a, bt_idx b)
+static double thinner(const bt_bodies *s, bt_idx a, bt_idx b) { return bt_min(s->thickness[a], s->thickness[b]); }
+
+static bool is_floe(const bt_world *w, bt_idx i)
 {
     const bt_bodies *s = &w->bodies;
-    const bool ice = s->thickness[a] > 0 && s->thickness[b] > 0, towed = s->gid[a] == w->towed || s->gid[b] == w->towed;
-    return ice && !towed && bt_part_first(s, a) == 0 && bt_part_first(s, b) == 0;
+    return s->thickness[i] > 0 && s->motion[i] != BT_STATIC && s->gid[i] != w->towed && bt_part_first(s, i) == 0;
 }
 
-static double thinner(const bt_bodies *s, bt_idx a, bt_idx b) { return bt_min(s->thickness[a], s->thickness[b]); }
+static bool applies(const bt_world *w, bt_idx a, bt_idx b)
+{
+    const double *h = w->bodies.thickness, deck = own_of(w)[BT_RAFT_FREEBOARD] * bt_max(h[a], h[b]);
+    return is_floe(w, a) && is_floe(w, b) && deck <= thinner(&w->bodies, a, b);
+}
 
 /// q0, N/m.
 static double line_load(const bt_world *w, bt_idx a, bt_idx b)

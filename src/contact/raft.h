@@ -48,8 +48,11 @@
 // projection leaves rafted overlap alone. Where ice crushes as well the smaller bound holds. A pair that has rafted
 // gives way in its area whichever law sets the bound; crushed depths are kept by pairs that have not.
 //
-// Between which bodies: floes of the field and by hand, also fixed ones, whose outlines are both convex. Not the
-// towed body (a deep hull does not raft), not walls, nothing without ice; a floe in convex parts stays rigid.
+// Between which bodies: floes of the field and by hand whose outlines are both convex. Not the towed body, walls and
+// fixed floes, which stand for structures, shores and grounded ice: ice does not slide over a deep hull. Nor a floe
+// whose freeboard, (1 − ρ_i/ρ_w) H, is more than the thickness of the other: all of the thinner edge then lies below
+// the deck of the thicker one, which is a hull to it (H some 9 times h; assumed). A floe in convex parts stays rigid.
+// Such pairs crush where ice.crushing says so.
 // Several floes on one spot are treated pair by pair: N sheets of h make N(N − 1)/2 pairs, and (N h)² − N h² = N(N −
 // 1) h² is as many times what it is for two, so that the energy of a pile, and the sum of the pressures between its
 // layers, come out right; friction in a pile that is sheared from top to bottom is (N + 1)/3 times too much.
@@ -62,8 +65,9 @@
 extern const bt_law bt_raft_law;
 
 /// Its numbers of the case, Pa/m: line load under which floes raft / thickness², 0 = they do not; pressure between
-/// sheets on each other / thickness; potential energy of sheets on each other / (area × both thicknesses).
-enum { BT_RAFT_LINE, BT_RAFT_SHEET, BT_RAFT_RISE };
+/// sheets on each other / thickness; potential energy of sheets on each other / (area × both thicknesses). Without a
+/// unit: freeboard / thickness.
+enum { BT_RAFT_LINE, BT_RAFT_SHEET, BT_RAFT_RISE, BT_RAFT_FREEBOARD };
 
 /// Which of its totals is the area of sheets at the end, m²: the summary also has it over the area of all ice.
 enum { BT_RAFT_TOTAL_AREA = 1 };

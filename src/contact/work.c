@@ -2,6 +2,8 @@
 // Work of the impulses of a contact, from velocities without and with contacts.
 #include "contact/work.h"
 
+#include <math.h>
+
 #include "contact/row.h"
 #include "tow/tow.h"
 
@@ -30,4 +32,9 @@ double bt_contacts_work(const bt_world *w, const bt_contact *u)
     for (int i = 0; i < n; i++)
         work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
     return work;
+}
+
+double bt_contacts_unsolved_work(const bt_contact *u, double residual)
+{
+    return (residual + 1e-12) * (fabs(u->ln[0]) + fabs(u->ln[1]) + fabs(u->lt));
 }

@@ -13,4 +13,8 @@ double bt_contacts_work(const bt_world *w, const bt_contact *u);
 /// The part of it of the normal impulse of point i, J.
 double bt_contacts_normal_work(const bt_world *w, const bt_contact *u, int i);
 
+/// The most that contact u can have given in a step whose residual this is, m/s, J: of an exact solution λ·w <= 0, and
+/// λᵀ½(w* + w2) = λᵀw2 − ½ λᵀWλ <= Σ |λ| residual.
+double bt_contacts_unsolved_work(const bt_contact *u, double residual);
+
 #endif

@@ -9,6 +9,8 @@
 
 #include "bergtow/shape.h"
 #include "field/field_make.h"
+#include "case/case_check.h"
+#include "geometry/path.h"
 #include "base/elementary.h"
 #include "base/largest.h"
 
@@ -247,29 +249,51 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
     return status;
 }
 
-/// From the body through the way-points (corners are not rounded), after the last straight on, lead.length in all.
-/// Returns the number of points.
-static int planned_path(const bt_case *c, double *path)
+/// The points of a path, and how much of its length is left.
+typedef struct {
+    double *at; ///< [n][2]
+    int n;
+    double left;
+} planned;
+
+/// On to (x, y), or as far towards it as there is length left.
+static void go_on(planned *p, double x, double y)
 {
-    double left = c->lead.length, ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
-    int n = 1;
-    path[0] = c->body.x;
-    path[1] = c->body.y;
-    for (int k = 0; k < c->tow.n_waypoints && left > 0; k++) {
-        const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1],
-                     far = bt_hypot(dx, dy);
-        if (far == 0) continue;
-        ux = dx / far, uy = dy / far;
-        const double leg = bt_min(far, left);
-        path[2 * n] = path[2 * n - 2] + leg * ux;
-        path[2 * n + 1] = path[2 * n - 1] + leg * uy;
-        left -= leg;
-        n++;
+    const double *last = p->at + 2 * (p->n - 1), dx = x - last[0], dy = y - last[1], far = bt_hypot(dx, dy);
+    if (far == 0 || p->left <= 0) return;
+    const double share = bt_min(far, p->left) / far;
+    p->at[2 * p->n] = last[0] + share * dx;
+    p->at[2 * p->n + 1] = last[1] + share * dy;
+    p->left -= share * far;
+    p->n++;
+}
+
+/// From the body to where the towing end starts, and along its path, arcs in pieces; lead.length in all. Without
+/// way-points straight on from the body. Caller frees; NULL with the reason in why.
+static double *planned_path(const bt_case *c, int *n, char why[200])
+{
+    enum { PIECES = 64 }; // of an arc: 3e-4 of its radius off, for half a turn
+    bt_path path;
+    if (!bt_case_tow_path(c, &path, why)) return NULL;
+    planned p = {.at = bt_alloc(2 + PIECES * (size_t)path.n, 2 * sizeof *p.at), .n = 1, .left = c->lead.length};
+    p.at[0] = c->body.x;
+    p.at[1] = c->body.y;
+    if (c->tow.n_waypoints == 0)
+        go_on(&p, c->body.x + c->lead.length * bt_cos(c->tow.direction),
+              c->body.y + c->lead.length * bt_sin(c->tow.direction));
+    for (int k = 0; c->tow.n_waypoints > 0 && k < path.n; k++) {
+        const bt_leg *l = &path.leg[k];
+        const int pieces = l->turn != 0 ? PIECES : 1;
+        go_on(&p, l->x, l->y);
+        for (int i = 1; i <= pieces && p.left > 0; i++) {
+            double at[2], tangent[2];
+            bt_path_at(&path, l->way + (isinf(l->length) ? p.left : l->length * i / pieces), at, tangent);
+            go_on(&p, at[0], at[1]);
+        }
     }
-    if (left <= 0) return n;
-    path[2 * n] = path[2 * n - 2] + left * ux;
-    path[2 * n + 1] = path[2 * n - 1] + left * uy;
-    return n + 1;
+    bt_path_free(&path);
+    *n = p.n;
+    return p.at;
 }
 
 bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err)
@@ -283,8 +307,17 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
                       c->path ? c->path : "case", (long long)f->outlines.split);
         return BT_ERR_CASE;
     }
-    double *path = bt_alloc((size_t)c->tow.n_waypoints + 2, 2 * sizeof *path);
-    const int n = planned_path(c, path);
+    int n;
+    char why[200];
+    double *path = planned_path(c, &n, why);
+    if (!path) {
+        bt_errors_add(err, "%s: tow.waypoints: %s", c->path ? c->path : "case", why);
+        return BT_ERR_CASE;
+    }
+    // What a moving window lets in behind the body is cut as far as the lead goes beyond its front, along x
+    // (case/case_environment.c); a shorter one ends there.
+    const bool round = c->domain.ends == BT_BOUND_PERIODIC ||
+                       (c->domain.ends == BT_BOUND_MOVING && c->lead.length > c->domain.ahead);
     const bt_lead l = {
         .name = c->path ? c->path : "case",
         .mode = c->lead.mode,
@@ -294,7 +327,7 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
         .path = path,
         .x0 = c->domain.x0,
         .y0 = c->domain.y0,
-        .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+        .period_x = round ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
         .round_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
     };

@@ -7,9 +7,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/// Work of the contacts above this fraction of the kinetic energy is no rounding.
-#define WORK_ROUNDING 1e-10
-
 #define COLUMN(column, name, member) [column] = {"history/" name, offsetof(bt_sample, member)}
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 
@@ -48,8 +45,6 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-static double added_energy(const bt_sample *s) { return s->contact_work > WORK_ROUNDING * s->kinetic_energy; }
-
 #define TOTAL(type, member, rule_, from)                                                                               \
     {                                                                                                                  \
         .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
@@ -74,9 +69,7 @@ static const bt_total totals[] = {
     TOTAL(I64, unconverged, STEPS, unconverged),
     LATER(F64, locked_steps, STEPS, locked, UNKNOWN),
     TOTAL(I64, unprojected, STEPS, unprojected),
-    {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)},
-     .rule = BT_TOTAL_STEPS,
-     .of = added_energy},
+    TOTAL(I64, positive_work, STEPS, added_energy),
     TOTAL(I64, restitution_cut, STEPS, restitution_cut),
     TOTAL(I64, repeats, SUM, repeats),
     TOTAL(I64, outrun, STEPS, outrun),
@@ -111,8 +104,7 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
     double x = 0, sum = 0;
     int64_t whole = 0;
     char *at = (char *)h + t->at.offset;
-    if (t->of) x = t->of(s);
-    else memcpy(&x, (const char *)s + t->offset, sizeof x);
+    memcpy(&x, (const char *)s + t->offset, sizeof x);
     if (t->rule == BT_TOTAL_STEPS) x = x != 0;
     if (t->at.type == BT_ITEM_I64) {
         memcpy(&whole, at, sizeof whole);

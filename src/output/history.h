@@ -54,7 +54,6 @@ typedef struct bt_total {
     /// In a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
     enum { BT_TOTAL_THERE, BT_TOTAL_ZERO, BT_TOTAL_UNKNOWN } missing;
     size_t offset;                        ///< of the number in bt_sample
-    double (*of)(const bt_sample *s);     ///< or a function of it
 } bt_total;
 int bt_n_history_totals(void);
 const bt_total *bt_history_total(int k);

@@ -58,6 +58,7 @@ typedef struct bt_sample {
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
     double kinetic_energy;  ///< of all dynamic bodies, J
     double contact_work;    ///< work of the contact impulses in the step, J (<= 0 for e <= 1)
+    double added_energy;    ///< 1 if it is more than the residual and rounding explain
     double repeats;         ///< times the step was solved again because floes outran the contact margin
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h

@@ -19,6 +19,7 @@
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
+#include "case/ice_bounds.h"
 #include "run/setup_tow.h"
 #include "base/elementary.h"
 
@@ -338,6 +339,20 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
     return sound;
 }
 
+/// Walls that leave less room than the ice takes end any run; who has set guard.overlap: 0 wants to see it.
+static bool check_closing(const bt_case *c, const bt_field *f, bt_errors *err)
+{
+    const double made = f->n > 0 ? f->concentration * f->ice_area : bt_case_made_area(c),
+                 closed = bt_ice_closed(c, made + bt_case_area_by_hand(c));
+    if (!(closed >= 1) || c->guard.overlap == 0) return true;
+    bt_errors_add(err,
+                  "%s: domain.%s_closing: by the end of the run the walls leave less room than rigid floes take, which "
+                  "would be a concentration of %.3g; slow them, shorten run.duration, or set ice.crushing.pressure or "
+                  "ice.rafting.kappa",
+                  c->path ? c->path : "case", c->domain.ends_closing > 0 ? "ends" : "sides", closed);
+    return false;
+}
+
 /// A pair has one contact, with the nearest image: across a period there must be room for both images apart.
 static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall, bt_errors *err)
 {
@@ -414,7 +429,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
             sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&c->floes[i], v), v).area / BT_PI);
         size = sum / c->n_floes;
     }
-    if (!check_inside(c, f, err)) return BT_ERR_CASE;
+    if (!check_inside(c, f, err) || !check_closing(c, f, err)) return BT_ERR_CASE;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     w->environment = bt_environment_create(c);

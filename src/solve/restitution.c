@@ -37,15 +37,14 @@ bool bt_restitution_lower(bt_world *w)
 {
     const bt_cells *ts = w->cells;
     bt_islands *s = w->solver->islands;
-    const double allowed = w->stats.residual + 1e-12;
     bt_islands_clear(w, s);
     for (bt_idx i = 0; i < ts->n_order; i++) {
         const bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
             const bt_contact *u = &cell->contacts[j];
-            const double normal = u->ln[0] + u->ln[1];
-            if (normal == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
-            bt_sum_add(&s->sum[bt_islands_of(w, s, u)], bt_contacts_work(w, u) - allowed * (normal + fabs(u->lt)));
+            if (u->ln[0] + u->ln[1] == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
+            bt_sum_add(&s->sum[bt_islands_of(w, s, u)],
+                       bt_contacts_work(w, u) - bt_contacts_unsolved_work(u, w->stats.residual));
         }
     }
     bt_islands_add(w, s);

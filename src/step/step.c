@@ -112,7 +112,10 @@ static void advance(bt_world *w)
     bt_tow_advance(w);
 }
 
-enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
+#define WORK_ROUNDING 1e-10 // of the kinetic energy: work of the contacts above it is no rounding
+
+enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE,
+       N_BALANCE };
 
 /// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
 static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)
@@ -137,6 +140,7 @@ static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)
         if (normal == 0 && u->lt == 0) continue;
         bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
         bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
+        bt_sum_add(&t->sum[UNSOLVED], bt_contacts_unsolved_work(u, w->stats.residual));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
         double jx, jy;
@@ -184,6 +188,7 @@ static void balance(bt_world *w)
     st->momentum_residual = scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
     st->contact_work = x[WORK];
     st->kinetic_energy = x[ENERGY];
+    st->added_energy = x[WORK] - x[UNSOLVED] > WORK_ROUNDING * x[ENERGY];
     st->n_points = (int64_t)x[POINTS];
     st->n_active = (int64_t)x[ACTIVE];
     st->overlap = all.most;

@@ -244,15 +244,30 @@ static void settle_places(const bt_world *w, candidate *list, size_t n, const sh
     free(tested);
 }
 
-/// What a contact knew of the last step is of the place the floe has left.
+/// Was the body of this id moved? False where this rank does not hold it.
+static bool was_moved(const bt_world *w, const uint8_t *moved, bt_gid gid)
+{
+    const bt_idx i = bt_world_index(w, gid);
+    return i >= 0 && moved[i];
+}
+
+/// What a pair knew, its impulses and the records of all laws, is of the place that the floe has left.
 static void forget_contacts(bt_world *w, const uint8_t *moved)
 {
     const bt_cells *t = w->cells;
-    for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx j = 0; j < t->cell[k].search.n_pairs; j++) {
-            bt_pair *p = &t->cell[k].search.pairs[j];
+    for (bt_idx k = 0; k < t->n; k++) {
+        bt_cell *cell = &t->cell[k];
+        for (bt_idx j = 0; j < cell->search.n_pairs; j++) {
+            bt_pair *p = &cell->search.pairs[j];
             if (moved[p->a] || moved[p->b]) p->n_points = 0;
         }
+        bt_idx kept = 0;
+        for (bt_idx j = 0; j < cell->laws.n_memory; j++) {
+            const bt_memory r = cell->laws.memory[j];
+            if (!was_moved(w, moved, r.a) && !was_moved(w, moved, r.b)) cell->laws.memory[kept++] = r;
+        }
+        cell->laws.n_memory = kept;
+    }
 }
 
 static void put(bt_world *w, bt_idx i)

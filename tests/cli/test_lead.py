@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, area, call, changed, placed, reading, run, worst_overlap, write_case
+from harness import CASE, area, call, changed, placed, reading, run, warned, worst_overlap, write_case
 
 # A body of 2 m in half-open ice of 0.8 m.
 BASE = {
@@ -77,6 +77,40 @@ def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     assert f"{lead['floes_cut']} floes" in result.stdout and f"cut into {lead['pieces']} pieces" in result.stdout
     again = run(tmp_path, made.dir / "case.resolved.yml", name="again")
     assert again.hash == made.hash
+
+
+def test_a_lead_beyond_the_front_of_a_moving_window_goes_round_it(tmp_path):
+    """Ice that enters is as it was made: two laps in a channel, where the mother field behind the body had none."""
+    case = changed(BASE,
+                   run__duration=150,
+                   domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"},
+                   body__x=None,
+                   ice={"concentration": 0.5, "size": 0.7},
+                   lead={"mode": "channel", "width": 2.6})
+    r = run(tmp_path, case, "--quiet")
+    assert r.summary["moving_window"]["laps"] > 1.5 and r.summary["lead"]["length_m"] > 25
+    assert r.series("ice_resistance").max() == 0
+
+
+def test_a_lead_that_drifts_away_is_reported(tmp_path):
+    case = changed(BASE, domain__sides="periodic", water={"current_y": 0.1}, lead=CHANNEL)
+    path = write_case(tmp_path, case)
+    text = "lead.width: the ice drifts by"
+    assert text in call("check", path).stdout and warned(run(tmp_path, case, "--quiet"), text)
+    assert text not in call("check", path, "--set", "water.current_y=0.02").stdout
+
+
+def test_a_polygon_has_the_lead_of_the_shape_it_draws(tmp_path):
+    """Its extent along the tow stands for body.length, which it does not have."""
+    square = changed(BASE, lead=CHANNEL)
+    drawn = changed(square, body__shape="polygon", body__length=None,
+                    body__vertices=[[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    turned = changed(drawn, body__yaw=90, body__vertices=[[-1, -2], [1, -2], [1, 2], [-1, 2]])
+    want = 0.2 * (25 - 1) + np.array([2, 2, 4])
+    for k, case in enumerate((square, drawn, turned)):
+        case = changed(case, tow__ramp=2)
+        found = call("check", write_case(tmp_path, case)).stdout
+        assert f"wide, {want[k]:.4g} m long" in found, found
 
 
 BAD = {

@@ -29,10 +29,10 @@ def test_every_key_has_its_place(table):
 
 
 def test_draws_reach_every_key_and_choice(table):
-    """In 600 cases: each key that is not left out, each choice, and both bounds of the ranges that say so."""
+    """In 3000 cases: each key that is not left out, each choice, and both bounds of the ranges that say so."""
     keys = {k["name"]: k for k in table["keys"]}
     seen = collections.defaultdict(set)
-    for seed in range(600):
+    for seed in range(3000):
         case = random_cases.draw(seed, table)
         for path, value in random_cases.flat(case):
             seen[path].add(value if not isinstance(value, list) else "list")

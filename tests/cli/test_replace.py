@@ -138,7 +138,7 @@ def test_signals_before_the_first_instruction_of_main(tmp_path):
 
 def test_a_failed_run_keeps_its_series(tmp_path):
     """What is made again for failure.h5 leaves result.h5 where no checkpoint was."""
-    r = run(tmp_path, changed(CLOSING, guard__overlap=0.02), code=NUMERIC)
+    r = run(tmp_path, changed(CLOSING, run__duration=0.7, guard__overlap=0.02), code=NUMERIC)
     assert (r.dir / "failure.h5").exists() and len(r.series("time")) > 0
 
 

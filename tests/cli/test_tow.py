@@ -199,6 +199,20 @@ def test_a_lead_goes_round_the_corners(tmp_path):
     assert near[0] == 0 and near[1] > 5
 
 
+def test_a_lead_has_the_corners_of_the_tow(tmp_path):
+    """A body of prescribed course on an arc of 200 m radius meets nothing in a channel of its width and a floe more."""
+    case = changed(VESSEL,
+                   run__duration=700,
+                   water=None,
+                   ice__start="rest",
+                   tow={"mode": "speed", "speed": 1, "ramp": 0, "waypoints": [[-200, -200], [-200, 400]],
+                        "turn_radius": 200},
+                   lead={"mode": "channel", "width": 110})
+    r = run(tmp_path, case, "--quiet")
+    assert r.summary["lead"]["floes_removed"] > 5 and np.ptp(r.series("body_y")) > 200
+    assert r.series("ice_resistance").max() == 0
+
+
 def test_a_vessel_in_a_moving_window(tmp_path):
     """Towards -x, round two corners, with ice that enters ahead: the window goes along, and all balances hold."""
     case = changed(VESSEL,

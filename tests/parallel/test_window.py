@@ -110,6 +110,24 @@ def test_what_is_recorded(alone):
     assert "moving window" in run(r.dir.parent, CASES[name], "--steps", 3, name="short").result.stdout
 
 
+def test_what_a_pair_has_crushed_stays_behind(tmp_path):
+    """Two floes beside the track, one of which runs into the other, enter together as they were made."""
+    squares = [{"shape": "square", "length": 20, "x": 100, "y": 120, "vy": 0.5},
+               {"shape": "square", "length": 20, "x": 100, "y": 140.5}]
+    r = run(tmp_path, {
+        "run": {"dt": 0.5, "duration": 400},
+        "domain": {"frame": "geographic", "length": 600, "width": 400, "ends": "moving", "sides": "periodic"},
+        "ice": {"concentration": 0, "size": 20, "thickness": 1, "start": "rest", "crushing": {"pressure": 100}},
+        "body": {"length": 50, "draft": 40},
+        "tow": {"speed": 1, "ramp": 0},
+        "floes": squares,
+    })
+    depth, renewed = r.series("crushed_depth", "window_renewed")
+    entered = np.flatnonzero(renewed)
+    assert renewed[entered[0]] == 2 and depth[entered[0] - 1] > 5
+    assert np.all(depth[entered[0]:] == 0)
+
+
 def test_open_water_does_not_see_it(tmp_path):
     bare = changed(TOW, ice__concentration=0, body__x=6, run__duration=150, tow__ramp=3)
     still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))

@@ -99,6 +99,7 @@ static void everything_wrong(bt_sample *s, int i)
 {
     s->unconverged = i % 3 == 0;
     s->contact_work = i % 5 == 0 ? 1 : -1;
+    s->added_energy = i % 5 == 0;
     s->repeats = i % 4 == 0 ? 3 : 0;
     s->overlap = 0.1;
     bt_sample_set(s, bt_series_find("crushed_depth"), 0.9);
