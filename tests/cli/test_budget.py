@@ -21,6 +21,7 @@ import budget_text  # noqa: E402
 import compared  # noqa: E402
 import findings  # noqa: E402
 import stat_budget  # noqa: E402
+import stat_load  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 from command import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
@@ -63,9 +64,10 @@ def test_intervals_hold_the_variances():
         whole = stat_budget.parts(groups)
         without = [stat_budget.parts(groups[:i] + groups[i + 1:]) for i in range(24)]
         for name, value in truth.items():
-            low, high = stat_budget._interval(getattr(whole, name), [getattr(p, name) for p in without], True)
+            low, high = stat_load.jackknife(getattr(whole, name), [getattr(p, name) for p in without],
+                                            scale=stat_load.LOG)
             inside[name] += low <= value ** 2 <= high
-        low, high = stat_budget._interval(whole.mean, [p.mean for p in without], False)
+        low, high = stat_load.jackknife(whole.mean, [p.mean for p in without])
         inside["mean"] += low <= 10 + c.sum() / 2 <= high
     assert all(0.9 <= n / 200 <= 1.0 for n in inside.values()), inside
 
