@@ -126,10 +126,11 @@ MUTANTS = {
                                  "parallel/test_ranks.py"], [
         ("any = w->bodies.restitution[cell->contacts[j].b] > 0;", "any = 0;", "no rebound is ever lowered"),
         ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
-        ("allowed * (normal + fabs(u->lt))", "0 * allowed * (normal + fabs(u->lt))", "rounding lowers rebounds"),
+        ("bt_contacts_unsolved_work(u, w->stats.residual)", "0", "rounding lowers rebounds"),
         ("        any = 1;\n    }\n    bt_domain_maxima(w, &any, 1);", "        any = 1;\n    }",
          "ranks disagree whether to solve again"),
-        ("if (normal == 0 || u->n == 0) continue;", "if (normal == 0) continue;", "sheets pay for rebounds"),
+        ("if (u->ln[0] + u->ln[1] == 0 || u->n == 0) continue;", "if (u->ln[0] + u->ln[1] == 0) continue;",
+         "sheets pay for rebounds"),
         ("bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);", ";", "a lowered rebound stays lowered"),
     ]),
     "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py::test_bodies_that_cannot_give_way",
@@ -324,7 +325,9 @@ MUTANTS = {
         ("(bt_patch){2 * fabs(bt_law_along", "(bt_patch){fabs(bt_law_along", "half of the chord bears"),
         ("u->ln[i] >= l->cap[i]", "u->ln[i] >= 2 * l->cap[i]", "rafting never begins"),
         ("t->laws.memory[at].value[3] = u->lt;", "", "friction of sheets starts at zero"),
-        ("return ice && !towed &&", "return ice &&", "the body rafts"),
+        ("&& s->gid[i] != w->towed &&", "&&", "the body rafts"),
+        ("&& s->motion[i] != BT_STATIC &&", "&&", "fixed floes raft"),
+        (" && deck <= thinner(&w->bodies, a, b)", " && deck >= 0", "deep floes raft"),
     ]),
     "src/tow/tow_rows.c": (["physics/test_tow", "unit/test_tow_case",
                             "scenes:line_fastened,bridle_unequal,thrust,vessel_details"], [
@@ -519,7 +522,7 @@ MUTANTS = {
         ("TOTAL(I64, repeats, SUM, repeats)", "TOTAL(I64, repeats, STEPS, repeats)", "repeats"),
         ("LATER(F64, locked_steps, STEPS, locked, UNKNOWN)", "LATER(F64, locked_steps, STEPS, locked, ZERO)",
          "steps of before a number was taken"),
-        ("s->contact_work > WORK_ROUNDING * s->kinetic_energy", "s->contact_work > s->kinetic_energy",
+        ("TOTAL(I64, positive_work, STEPS, added_energy)", "TOTAL(I64, positive_work, STEPS, repeats)",
          "energy from contacts"),
     ]),
     "src/run/guard.c": (["unit/test_guard", "cli/test_guards.py"], [

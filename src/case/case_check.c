@@ -85,29 +85,10 @@ static void follow_start(bool drifts, double *vx, double *vy)
     bt_check_fill(vy, 0);
 }
 
-/// Numbers of domain, ice and body.
-static void follow_numbers(bt_case *c)
-{
-    bool basin = c->domain.frame == BT_FRAME_BASIN;
-    if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
-    bt_check_fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
-    bt_check_fill(&c->domain.y0, -c->domain.width / 2);
-    bt_check_fill(&c->ice.x_min, c->domain.x0);
-    bt_check_fill(&c->ice.x_max, c->domain.x0 + c->domain.length);
-    bt_check_fill(&c->ice.y_min, c->domain.y0);
-    bt_check_fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
-    bt_check_fill(&c->body.width, c->body.length);
-    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * bt_case_body_length(c, 0) : 0);
-    bt_check_fill(&c->domain.ahead, bt_case_window_ahead(c));
-    bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
-    bt_check_fill(&c->body.friction, c->ice.friction);
-    bt_check_fill(&c->body.restitution, c->ice.restitution);
-}
-
 static void follow(const check *k)
 {
     bt_case *c = k->c;
-    follow_numbers(c);
+    bt_case_fill_scene(c);
     const bool drift = c->ice.start == BT_START_DRIFT;
     follow_start(drift && c->tow.mode == BT_TOW_NONE && c->body.shape != BT_BODY_ABSENT, &c->body.vx, &c->body.vy);
     for (bt_idx i = 0; i < c->n_floes; i++) {
@@ -118,17 +99,6 @@ static void follow(const check *k)
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
-}
-
-void bt_case_fill(bt_case *c)
-{
-    double v[2 * BT_MAX_VERTICES];
-    const int n = bt_case_waterline(c, v);
-    follow_numbers(c);
-    bt_case_tow_follow(&(check){.c = c});
-    bt_case_tow_hull(c, n, v);
-    bt_case_tow_ramp(c);
-    bt_case_lead_follow(c, n, v);
 }
 
 // ---- checks ----

@@ -22,6 +22,8 @@ static inline void bt_check_fill(double *member, double value)
 
 /// The defaults of numbers that follow from other keys, of a case whose shapes are sound.
 void bt_case_fill(bt_case *c);
+/// Those of domain, ice and body alone.
+void bt_case_fill_scene(bt_case *c);
 
 /// Absolute path of a file that is named in the file `from`, to whose folder it is relative; NULL where it is absolute,
 /// or that folder is not there.

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Numbers that follow from other keys where they are not given.
+#include "case/case_check.h"
+
+#include "bergtow/shape.h"
+#include "base/largest.h"
+
+void bt_case_fill_scene(bt_case *c)
+{
+    bool basin = c->domain.frame == BT_FRAME_BASIN;
+    if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
+    bt_check_fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
+    bt_check_fill(&c->domain.y0, -c->domain.width / 2);
+    bt_check_fill(&c->ice.x_min, c->domain.x0);
+    bt_check_fill(&c->ice.x_max, c->domain.x0 + c->domain.length);
+    bt_check_fill(&c->ice.y_min, c->domain.y0);
+    bt_check_fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
+    bt_check_fill(&c->body.width, c->body.length);
+    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * bt_case_body_length(c, 0) : 0);
+    bt_check_fill(&c->domain.ahead, bt_case_window_ahead(c));
+    bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
+    bt_check_fill(&c->body.friction, c->ice.friction);
+    bt_check_fill(&c->body.restitution, c->ice.restitution);
+}
+
+void bt_case_fill(bt_case *c)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    bt_case_fill_scene(c);
+    bt_case_tow_follow(&(bt_check){.c = c});
+    bt_case_tow_hull(c, n, v);
+    bt_case_tow_ramp(c);
+    bt_case_lead_follow(c, n, v);
+}
