@@ -406,7 +406,7 @@ static void check_path(const check *k, int n, const double *v)
     if (!straight || !(c->run.duration > 0) ||
         !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme"))
         return;
-    double way = bt_case_tow_distance(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
+    double way = bt_case_tow_led(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
     double reach = way, slack = 1e-9 * (c->domain.length + c->domain.width);
@@ -424,7 +424,7 @@ static void check_path(const check *k, int n, const double *v)
     bt_check_fault(k, "run.duration",
                    "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
                    "enlarge the domain",
-                   way, reach, floor(time * 100) / 100);
+                   way, reach, time);
 }
 
 // After check_tow: the reference speed goes by it.

@@ -33,15 +33,19 @@ double bt_speed_law_way(const bt_speed_law *l, double t)
     return l->speed * (t < l->ramp ? t * t / (2 * l->ramp) : t - l->ramp / 2);
 }
 
-double bt_speed_law_time(const bt_speed_law *l, double way, double latest)
+double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt)
 {
-    if (l->n == 0)
-        return way < l->speed * l->ramp / 2 ? sqrt(2 * l->ramp * way / l->speed) : way / l->speed + l->ramp / 2;
-    double low = 0, high = latest;
-    for (int i = 0; i < 100; i++) {
-        const double mid = 0.5 * (low + high);
-        if (bt_speed_law_way(l, mid) < way) low = mid;
-        else high = mid;
+    const double ramp[] = {0, 0, l->ramp, l->speed}, *p = l->n > 0 ? l->programme : ramp;
+    const int points = l->n > 0 ? l->n : 2;
+    double sum = 0;
+    int64_t k = 1; // of the steps that end in one linear piece the mean speed is that of the first and the last
+    for (int i = 0; i <= points && k <= n; i++) {
+        const double ends = i < points ? floor(p[2 * i] / dt) : INFINITY;
+        const int64_t last = ends < (double)n ? (int64_t)ends : n;
+        if (last < k) continue;
+        sum += 0.5 * (double)(last - k + 1) *
+               (bt_speed_law_at(l, (double)k * dt) + bt_speed_law_at(l, (double)last * dt));
+        k = last + 1;
     }
-    return low;
+    return dt * sum;
 }
