@@ -420,7 +420,7 @@ static void check_path(const check *k, int n, const double *v)
         reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
     if (reach >= way) return;
     reach = bt_max(reach, 0);
-    const double time = bt_case_tow_time(c, reach);
+    const double time = bt_case_tow_last(c, reach);
     bt_check_fault(k, "run.duration",
                    "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
                    "enlarge the domain",

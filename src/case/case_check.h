@@ -40,7 +40,10 @@ double bt_case_tow_distance(const bt_case *c, double t);
 /// The same as a run goes it, in whole steps at the speed of their end, after those that time t takes, m.
 double bt_case_tow_led(const bt_case *c, double t);
 
-/// Time of the last step after which it has led along no more than this way, s.
+/// Time of the last step after which that is no more than this way, s.
+double bt_case_tow_last(const bt_case *c, double way);
+
+/// Time at which the tow has led along this way at the latest within the run, s.
 double bt_case_tow_time(const bt_case *c, double way);
 
 #define BT_TURN 1e-6 ///< rad; less is rounding

@@ -45,6 +45,12 @@ double bt_case_tow_led(const bt_case *c, double t)
 double bt_case_tow_time(const bt_case *c, double way)
 {
     const bt_speed_law l = speed_law(c);
+    return bt_speed_law_time(&l, way, c->run.duration);
+}
+
+double bt_case_tow_last(const bt_case *c, double way)
+{
+    const bt_speed_law l = speed_law(c);
     int64_t low = 0, high = bt_case_steps(c);
     while (low < high) {
         const int64_t mid = low + (high - low + 1) / 2;

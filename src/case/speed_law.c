@@ -33,6 +33,19 @@ double bt_speed_law_way(const bt_speed_law *l, double t)
     return l->speed * (t < l->ramp ? t * t / (2 * l->ramp) : t - l->ramp / 2);
 }
 
+double bt_speed_law_time(const bt_speed_law *l, double way, double latest)
+{
+    if (l->n == 0)
+        return way < l->speed * l->ramp / 2 ? sqrt(2 * l->ramp * way / l->speed) : way / l->speed + l->ramp / 2;
+    double low = 0, high = latest;
+    for (int i = 0; i < 100; i++) {
+        const double mid = 0.5 * (low + high);
+        if (bt_speed_law_way(l, mid) < way) low = mid;
+        else high = mid;
+    }
+    return low;
+}
+
 double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt)
 {
     const double ramp[] = {0, 0, l->ramp, l->speed}, *p = l->n > 0 ? l->programme : ramp;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The speed of the tow in time: a linear ramp to a constant speed, or a programme of points that is linear between.
 //
-//     ramp        v(t) = v min(1, t/T);   s(t) = v t²/2T up to T, then v (t − T/2)
-//     programme   linear between its points, constant outside, in place of that
+//     ramp        v(t) = v min(1, t/T);   s(t) = v t²/2T up to T, then v (t − T/2);   t(s) = √(2 T s/v), then s/v + T/2
+//     programme   linear between its points, constant outside, in place of that; t(s) by bisection of s(t)
 #ifndef BERGTOW_SPEED_LAW_H
 #define BERGTOW_SPEED_LAW_H
 
@@ -20,6 +20,9 @@ double bt_speed_law_at(const bt_speed_law *l, double t);
 
 /// Way after time t ≥ 0, m.
 double bt_speed_law_way(const bt_speed_law *l, double t);
+
+/// Time after which the way is s, s; latest: a time by which it is.
+double bt_speed_law_time(const bt_speed_law *l, double way, double latest);
 
 /// Way after n steps of dt, each at the speed of its end: Σ Δt v(kΔt), m. On a rise that is v Δt/2 more than s(t).
 double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt);

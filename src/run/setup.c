@@ -262,7 +262,7 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
     for (int i = 0; i < POINTS; i++, w->step++) {
         double d[2];
         time[i] = c->run.duration * i / (POINTS - 1);
-        bt_setup_tow_displacement(c, tow, time[i], d);
+        bt_setup_tow_displacement(c, tow, bt_case_tow_distance(c, time[i]), d);
         x[i] = c->body.x + d[0] - w->undisturbed->drift_x;
         y[i] = c->body.y + d[1] - w->undisturbed->drift_y;
         bt_environment_begin(w);
@@ -346,7 +346,7 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double fr
 static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
 {
     d[0] = w->bodies.vel[m].x * t, d[1] = w->bodies.vel[m].y * t;
-    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, t, d);
+    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, bt_case_tow_led(c, t), d);
 }
 
 /// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
