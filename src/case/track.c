@@ -11,11 +11,16 @@
 
 #define MOST_POINTS 20000.0 // of a track whose wake is sought: each is compared with all before
 
+static double between(const bt_track *t, int64_t i, int64_t j)
+{
+    return bt_hypot(t->x[j] - t->x[i], t->y[j] - t->y[i]);
+}
+
 double bt_track_speed(const bt_track *t)
 {
     double most = 0;
     for (int64_t i = 1; i < t->n; i++)
-        most = bt_max(most, bt_hypot(t->x[i] - t->x[i - 1], t->y[i] - t->y[i - 1]) / (t->time[i] - t->time[i - 1]));
+        most = bt_max(most, between(t, i - 1, i) / (t->time[i] - t->time[i - 1]));
     return most;
 }
 
@@ -49,27 +54,24 @@ double bt_track_fall(const bt_case *c, const bt_track *t)
 /// d less whole periods, as near to 0 as that gets.
 static double nearest(double d, double period) { return period > 0 ? d - period * nearbyint(d / period) : d; }
 
-/// First point that lies less than `size` from an earlier one, around a period; t->n without. On a track that is
-/// thinned out to half of that.
+/// First point that lies less than `size` from an earlier one, around a period; t->n without. Of a track that is
+/// thinned out to an eighth of that, against one of half of it.
 static int64_t first_in_wake(const bt_track *t, const double period[2], double size)
 {
     if (!(period[0] > 0 || period[1] > 0)) return t->n;
     double way = 0;
-    for (int64_t i = 1; i < t->n; i++) {
-        const double step = bt_hypot(t->x[i] - t->x[i - 1], t->y[i] - t->y[i - 1]);
-        if (step > 0) way += step;
-    }
+    for (int64_t i = 1; i < t->n; i++) way += isnan(t->x[i - 1]) ? 0 : between(t, i - 1, i);
     const double apart = bt_max(0.5 * size, way / MOST_POINTS);
-    int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, found = t->n;
+    int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, last = 0, found = t->n;
     for (int64_t i = 0; i < t->n && found == t->n; i++) {
-        if (isnan(t->x[i])) continue;
-        if (n > 0 && bt_hypot(t->x[i] - t->x[kept[n - 1]], t->y[i] - t->y[kept[n - 1]]) < apart) continue;
+        if (isnan(t->x[i]) || (n > 0 && between(t, last, i) < 0.25 * apart)) continue;
+        last = i;
         for (int64_t k = 0; k < n && found == t->n; k++) {
             const double dx = t->x[i] - t->x[kept[k]], dy = t->y[i] - t->y[kept[k]], x = nearest(dx, period[0]),
                          y = nearest(dy, period[1]);
             if ((x != dx || y != dy) && bt_hypot(x, y) < size) found = i;
         }
-        kept[n++] = i;
+        if (n == 0 || between(t, kept[n - 1], i) >= apart) kept[n++] = i;
     }
     free(kept);
     return found;

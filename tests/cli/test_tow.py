@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, call, changed, run, warned
+from harness import CASE, call, changed, run, warned, write_case
 
 # A vessel on a bridle round two corners through loose ice with current and Coriolis force.
 VESSEL = {
