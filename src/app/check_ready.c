@@ -127,8 +127,8 @@ static void warn_of_track(const bt_case *c, const bt_check_ice *n, bt_errors *wa
         const double fall = bt_track_fall(c, &t);
         if (fall > BT_WINDOW_STRIDE * n->size)
             bt_errors_add(warnings,
-                          "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a moving "
-                          "window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
+                          "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a "
+                          "moving window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
                           fall);
     }
     bt_setup_track_free(&t);

@@ -17,9 +17,9 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_r
 /// body into body, m/s; NaN where ice.start, the tow or a velocity that is given has it otherwise.
 void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2]);
 
-/// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it pulls),
-/// with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration. Empty without
-/// a tow. Release with bt_setup_track_free.
+/// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it
+/// pulls), with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration.
+/// Empty without a tow. Release with bt_setup_track_free.
 bt_track bt_setup_track(const bt_case *c, double size, double thickness, double concentration);
 void bt_setup_track_free(bt_track *t);
 

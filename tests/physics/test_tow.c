@@ -520,8 +520,8 @@ static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
     bt_world_free(w);
 }
 
-/// Way-points whose course changes by more than 90°, sharp or round: on the leg before, the point ahead can lie abeam of
-/// the vessel, which once hung there for ever.
+/// Way-points whose course changes by more than 90°, sharp or round: on the leg before, the point ahead can lie abeam
+/// of the vessel, which once hung there for ever.
 static void a_vessel_turns_back(void **state)
 {
     (void)state;
