@@ -13,6 +13,7 @@
 #include "case/ice_bounds.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
+#include "output/summary_window.h"
 #include "base/elementary.h"
 
 static bt_check_ice ice_of_case(const bt_case *c)
@@ -52,7 +53,10 @@ bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
     bt_check_step s = {.longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5,
                        .pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size};
     s.size = s.pieces ? c->lead.floe_size : n->size;
-    s.passed = n->count < 1 ? 0 : c->run.dt * bt_case_reference_speed(c) / s.size;
+    bt_track t = n->count < 1 ? (bt_track){0} : bt_setup_track(c, n->size, n->thickness, n->concentration);
+    s.speed = bt_max(bt_case_reference_speed(c), bt_track_speed(&t) * (1 - 1e-9)); // rounding
+    bt_setup_track_free(&t);
+    s.passed = n->count < 1 ? 0 : c->run.dt * s.speed / s.size;
     s.contact = c->run.dt <= s.longest;
     s.floes = s.passed <= 0.1;
     return s;
@@ -92,6 +96,8 @@ bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_
     return status == BT_OK ? try_setup(c, f, err) : status;
 }
 
+#define SLOW 2.0 // a reference speed less than the speed of the ice by more than this is reported, assumed
+
 static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
     const bt_check_step s = bt_check_step_of(c, n);
@@ -101,29 +107,39 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
     if (!s.floes)
         bt_errors_add(
             warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s",
-            c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / bt_case_reference_speed(c));
+            c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / s.speed);
+    const double reference = bt_case_reference_speed(c);
+    if (n->count >= 1 && s.speed > SLOW * reference)
+        bt_errors_add(warnings,
+                      "solver.reference_speed: %.3g m/s, and the ice comes at up to %.3g m/s: contacts are solved more "
+                      "strictly than a result needs, and slower hits count as collisions; set it to that",
+                      reference, s.speed);
 }
 
-/// A moving window takes in ice ahead only, where water that is as fast has been refused (case/case_window.c); a lead
-/// goes with the ice.
-static void warn_of_drift(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+/// Where the tow leads in the ice, which water and wind move; a lead goes with it.
+static void warn_of_track(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
     if (n->count < 1) return;
     double ice[2], body[2];
     bt_setup_drift(c, n->size, n->thickness, ice, body);
     bt_case_warn_lead(c, ice[0] * c->run.duration, ice[1] * c->run.duration, warnings);
-    if (c->domain.ends != BT_BOUND_MOVING || !(c->tow.speed > 0)) return;
-    const double along = bt_cos(c->tow.direction), drift = along > 0 ? ice[0] : -ice[0];
-    if (drift >= c->tow.speed * fabs(along))
-        bt_errors_add(warnings,
-                      "domain.ends: wind and water carry the ice at %.3g m/s along x, as fast as the tow, and a moving "
-                      "window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
-                      drift);
+    bt_track t = bt_setup_track(c, n->size, n->thickness, n->concentration);
+    bt_track_warn(c, &t, warnings);
+    if (c->domain.ends == BT_BOUND_MOVING) {
+        bt_summary_window_warn_laps(warnings, bt_track_laps(c, &t));
+        const double fall = bt_track_fall(c, &t);
+        if (fall > BT_WINDOW_STRIDE * n->size)
+            bt_errors_add(warnings,
+                          "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a "
+                          "moving window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
+                          fall);
+    }
+    bt_setup_track_free(&t);
 }
 
 void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings)
 {
-    warn_of_drift(c, n, warnings);
+    warn_of_track(c, n, warnings);
     const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
     bt_arch_warn(&arch, warnings);
     const bt_packing packing = bt_packing_of(c, n->concentration);

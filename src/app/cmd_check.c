@@ -175,13 +175,14 @@ static void print_laws(const bt_case *c, const bt_check_ice *n)
     }
 }
 
-static void print_window(const bt_case *c)
+static void print_window(const bt_case *c, const bt_check_ice *n)
 {
     if (c->domain.ends != BT_BOUND_MOVING) return;
-    const double way = bt_case_tow_distance(c, c->run.duration);
+    bt_track t = n->count < 1 ? (bt_track){0} : bt_setup_track(c, n->size, n->thickness, n->concentration);
     printf("moving window        the body keeps %.4g m from its front and %.4g m from its rear; the tow is %.3g "
-           "windows long\n",
-           c->domain.ahead, c->domain.length - c->domain.ahead, way / c->domain.length);
+           "windows of ice long\n",
+           c->domain.ahead, c->domain.length - c->domain.ahead, bt_track_laps(c, &t));
+    bt_setup_track_free(&t);
 }
 
 /// With a field that was read as it will be; of a field that is still to be made, the strip.
@@ -234,7 +235,7 @@ static void print_step(const bt_case *c, const bt_check_ice *n)
            c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", bt_check_verdict(s.contact));
     if (n->count < 1) return;
     printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed,
-           s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, bt_check_verdict(s.floes));
+           s.pieces ? "pieces of the lead" : "floe sizes", s.size / s.speed, bt_check_verdict(s.floes));
 }
 
 static const char *bytes(double b, char out[32])
@@ -311,7 +312,7 @@ static void print_text(const char *path, const bt_case *c, const bt_field *f, co
     print_body(c);
     print_width(c, n);
     print_packing(c, n);
-    print_window(c);
+    print_window(c, n);
     print_environment(c);
     print_drift(c, run);
     print_lead(c, lead);

@@ -16,6 +16,7 @@ typedef struct bt_check_ice {
 /// The time step against the rule in cmd_check.c.
 typedef struct bt_check_step {
     double longest;      ///< of a collision, s
+    double speed;        ///< of the contacts: the reference speed, or the planned one through the ice if that is more
     double size, passed; ///< of the floes, or of the pieces of a managed lead, m; sizes passed in a step
     bool pieces;
     bool contact, floes; ///< is the step short enough for a collision; for the floes

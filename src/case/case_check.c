@@ -389,14 +389,14 @@ static double way_to_wall(const bt_case *c, double room, double towards, double 
 {
     double early = 0, late = c->run.duration;
     const double slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (!(towards > 0) || towards * bt_case_tow_distance(c, late) + closing * late <= room + slack) return INFINITY;
+    if (!(towards > 0) || towards * bt_case_tow_led(c, late) + closing * late <= room + slack) return INFINITY;
     if (closing == 0) return bt_max(0, room / towards);
     for (int k = 0; k < 60; k++) {
         const double middle = 0.5 * (early + late);
-        if (towards * bt_case_tow_distance(c, middle) + closing * middle <= room) early = middle;
+        if (towards * bt_case_tow_led(c, middle) + closing * middle <= room) early = middle;
         else late = middle;
     }
-    return bt_case_tow_distance(c, early);
+    return bt_case_tow_led(c, early);
 }
 
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
@@ -410,7 +410,7 @@ static void check_path(const check *k, int n, const double *v)
         !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme domain.ends_closing "
                            "domain.sides_closing"))
         return;
-    double way = bt_case_tow_distance(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
+    double way = bt_case_tow_led(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     const box b = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
     double reach = INFINITY;
     if (c->domain.ends == BT_BOUND_WALL) {
@@ -422,11 +422,11 @@ static void check_path(const check *k, int n, const double *v)
         reach = bt_min(reach, way_to_wall(c, b.y_min - c->domain.y0, -uy, c->domain.sides_closing));
     }
     if (isinf(reach)) return;
-    const double time = bt_case_tow_time(c, reach);
+    const double time = bt_case_tow_last(c, reach);
     bt_check_fault(k, "run.duration",
                    "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
                    "enlarge the domain",
-                   way, reach, floor(time * 100) / 100);
+                   way, reach, time);
 }
 
 // After check_tow: the reference speed goes by it.

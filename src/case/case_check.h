@@ -47,8 +47,18 @@ void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings
 /// Length of path that the tow has led along after time t, with ramp or programme, m.
 double bt_case_tow_distance(const bt_case *c, double t);
 
+/// The same as a run goes it, in whole steps at the speed of their end, after those that time t takes, m.
+double bt_case_tow_led(const bt_case *c, double t);
+
+/// Time of the last step after which that is no more than this way, s.
+double bt_case_tow_last(const bt_case *c, double way);
+
 /// Time at which the tow has led along this way at the latest within the run, s.
 double bt_case_tow_time(const bt_case *c, double way);
+
+#define BT_TURN 1e-6 ///< rad; less is rounding
+/// Change of course at way-point k, from 0, either way, rad; 0 at the last.
+double bt_case_tow_turn(const bt_case *c, int k);
 
 /// Natural period of the body, with added mass, on its line or lines (taken as parallel), against the vessel in mode
 /// thrust, s; 0 without a line.
@@ -62,7 +72,8 @@ bool bt_case_start_is_slow(const bt_case *c);
 /// Time that the tow takes to its speed at its steepest rise, s: the ramp; of a programme that of a ramp as steep. A
 /// programme that begins with a speed begins with a jerk: 0.
 double bt_case_steepest_ramp(const bt_case *c);
-/// Report a start that is not.
+/// Report a start that is not; and what a body at a prescribed speed does within one step, under a tow force that is as
+/// large as the step is short: turn at a sharp corner, or reach another speed.
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
 
 /// The direction that way-points give, where the place of the body is known: a moving window lies by it.

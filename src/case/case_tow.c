@@ -38,10 +38,36 @@ double bt_case_tow_distance(const bt_case *c, double t)
     return bt_speed_law_way(&l, t);
 }
 
+double bt_case_tow_led(const bt_case *c, double t)
+{
+    const bt_speed_law l = speed_law(c);
+    return bt_speed_law_led(&l, (int64_t)ceil(t / c->run.dt * (1 - 1e-12)), c->run.dt);
+}
+
 double bt_case_tow_time(const bt_case *c, double way)
 {
     const bt_speed_law l = speed_law(c);
     return bt_speed_law_time(&l, way, c->run.duration);
+}
+
+double bt_case_tow_last(const bt_case *c, double way)
+{
+    const bt_speed_law l = speed_law(c);
+    int64_t low = 0, high = bt_case_steps(c);
+    while (low < high) {
+        const int64_t mid = low + (high - low + 1) / 2;
+        if (bt_speed_law_led(&l, mid, c->run.dt) <= way) low = mid;
+        else high = mid - 1;
+    }
+    return (double)low * c->run.dt;
+}
+
+double bt_case_tow_turn(const bt_case *c, int k)
+{
+    const double *p = c->tow.waypoints + 2 * k;
+    if (k + 1 >= c->tow.n_waypoints) return 0;
+    const double before = k > 0 ? bt_atan2(p[1] - p[-1], p[0] - p[-2]) : c->tow.direction;
+    return fabs(remainder(bt_atan2(p[3] - p[1], p[2] - p[0]) - before, 2 * BT_PI));
 }
 
 // ---- where it starts, and its path ----
@@ -160,8 +186,35 @@ bool bt_case_start_is_slow(const bt_case *c)
     return bt_case_steepest_ramp(c) >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
 }
 
+/// Speed and course that change within a step.
+static void warn_of_jerks(const bt_case *c, bt_errors *warnings)
+{
+    const double *p = c->tow.programme;
+    for (int i = 0; i + 1 < c->tow.n_programme; i++)
+        if (p[2 * i + 3] != p[2 * i + 1] && p[2 * i + 2] - p[2 * i] < c->run.dt)
+            bt_errors_add(warnings,
+                          "tow.programme: from %g to %g m/s in less than a step: the tow force is then mass times the "
+                          "change over run.dt, as large as that is short, and its peak says nothing; let the change "
+                          "take several steps",
+                          p[2 * i + 1], p[2 * i + 3]);
+    bt_path path = {0};
+    char why[200];
+    if (c->tow.n_waypoints == 0 || c->tow.turn_radius > 0 || !bt_case_tow_path(c, &path, why)) return;
+    for (int k = 0; k < path.n_marks; k++)
+        if (bt_case_tow_turn(c, k) > BT_TURN && path.mark[k] < bt_case_tow_distance(c, c->run.duration)) {
+            bt_errors_add(warnings,
+                          "tow.turn_radius: 0 m, and the body turns at way-point %d within one step: the tow force is "
+                          "then mass times the change of velocity over run.dt, as large as that is short, and its peak "
+                          "says nothing; give a radius",
+                          k + 1);
+            break;
+        }
+    bt_path_free(&path);
+}
+
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
+    if (c->tow.mode == BT_TOW_SPEED) warn_of_jerks(c, warnings);
     if (bt_case_start_is_slow(c)) return;
     const double period = bt_case_line_period(c), ramp = bt_case_steepest_ramp(c);
     if (c->tow.n_programme > 0)
@@ -325,7 +378,7 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
     for (int i = 1; i <= TIMES; i++) {
         const double time = c->run.duration * i / TIMES;
         const double close_x = c->domain.ends_closing * time - slack, close_y = c->domain.sides_closing * time - slack;
-        bt_path_at(path, bt_case_tow_distance(c, time), at, tangent);
+        bt_path_at(path, bt_case_tow_led(c, time), at, tangent);
         for (int j = 0; j < n; j++) {
             const double x = c->body.x + at[0] - start[0] + cy * v[2 * j] - sy * v[2 * j + 1] - c->domain.x0;
             const double y = c->body.y + at[1] - start[1] + sy * v[2 * j] + cy * v[2 * j + 1] - c->domain.y0;

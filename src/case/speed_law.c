@@ -45,3 +45,20 @@ double bt_speed_law_time(const bt_speed_law *l, double way, double latest)
     }
     return low;
 }
+
+double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt)
+{
+    const double ramp[] = {0, 0, l->ramp, l->speed}, *p = l->n > 0 ? l->programme : ramp;
+    const int points = l->n > 0 ? l->n : 2;
+    double sum = 0;
+    int64_t k = 1; // of the steps that end in one linear piece the mean speed is that of the first and the last
+    for (int i = 0; i <= points && k <= n; i++) {
+        const double ends = i < points ? floor(p[2 * i] / dt) : INFINITY;
+        const int64_t last = ends < (double)n ? (int64_t)ends : n;
+        if (last < k) continue;
+        sum += 0.5 * (double)(last - k + 1) *
+               (bt_speed_law_at(l, (double)k * dt) + bt_speed_law_at(l, (double)last * dt));
+        k = last + 1;
+    }
+    return dt * sum;
+}

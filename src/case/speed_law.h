@@ -6,6 +6,8 @@
 #ifndef BERGTOW_SPEED_LAW_H
 #define BERGTOW_SPEED_LAW_H
 
+#include <stdint.h>
+
 /// Views into a case or a tow.
 typedef struct bt_speed_law {
     double speed, ramp;       ///< v m/s; T s
@@ -21,5 +23,8 @@ double bt_speed_law_way(const bt_speed_law *l, double t);
 
 /// Time after which the way is s, s; latest: a time by which it is.
 double bt_speed_law_time(const bt_speed_law *l, double way, double latest);
+
+/// Way after n steps of dt, each at the speed of its end: Σ Δt v(kΔt), m. On a rise that is v Δt/2 more than s(t).
+double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt);
 
 #endif

@@ -63,11 +63,16 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
     return true;
 }
 
-void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
+static const bt_leg *leg_at(const bt_path *p, double way)
 {
     int k = 0;
     while (k + 1 < p->n && way >= p->leg[k + 1].way) k++;
-    const bt_leg *l = &p->leg[k];
+    return &p->leg[k];
+}
+
+void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
+{
+    const bt_leg *l = leg_at(p, way);
     const double s = way - l->way;
     double along = s, aside = 0, c = 1, d = 0;
     if (l->turn != 0) {
@@ -86,7 +91,14 @@ double bt_path_near(const bt_path *p, double way, double x, double y)
     for (int k = 0; k < STEPS; k++) {
         double at[2], t[2];
         bt_path_at(p, way, at, t);
-        way += (x - at[0]) * t[0] + (y - at[1]) * t[1];
+        const double along = (x - at[0]) * t[0] + (y - at[1]) * t[1], turn = leg_at(p, way)->turn;
+        if (turn == 0) {
+            way += along;
+            continue;
+        }
+        // by the angle about the centre, which lies 1/turn to the left
+        const double aside = (y - at[1]) * t[0] - (x - at[0]) * t[1];
+        way += bt_atan2(turn * along, 1 - turn * aside) / turn;
     }
     return way;
 }

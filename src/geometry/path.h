@@ -32,7 +32,7 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
 void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2]);
 
 /// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the
-/// tangent.
+/// tangent of a leg, or about the centre of an arc.
 double bt_path_near(const bt_path *p, double way, double x, double y);
 
 void bt_path_free(bt_path *p);

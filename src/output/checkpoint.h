@@ -43,7 +43,7 @@
 //                     - what is recorded of the towed body, its place
 //   bt_undisturbed    S drift, vel
 //                     D the rest
-//   bt_window         S start, rear, counters, dropped, brought
+//   bt_window         S start, rear, counters, most, overtaken, dropped, brought
 //                     D the rest
 //   bt_environment    D (tables from the checkpoint)
 //   bt_world          S step, drift, events

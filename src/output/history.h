@@ -24,14 +24,16 @@ typedef enum bt_column {
     BT_COL_RESIDUAL,
     BT_COL_COLLISION,
     BT_COL_QUASI_STATIC,
-    BT_COL_SPEED_ICE, ///< these four not in older checkpoints: then NaN
+    BT_COL_SPEED_ICE, ///< from here on not in older checkpoints: then NaN
     BT_COL_LEEWAY_ICE,
     BT_COL_SPEED_WATER,
     BT_COL_LEEWAY_WATER,
+    BT_COL_IN_ICE_X,
+    BT_COL_IN_ICE_Y,
     BT_N_COLUMNS
 } bt_column;
 
-/// What the summary keeps of every step, whatever output.sample_every says: 152 bytes a step.
+/// What the summary keeps of every step, whatever output.sample_every says: 168 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity

@@ -163,6 +163,9 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->leeway_through_ice = through_ice[1] * dx - through_ice[0] * dy;
     s->speed_through_water = through_water[0] * dx + through_water[1] * dy;
     s->leeway_through_water = through_water[1] * dx - through_water[0] * dy;
+    double place[2];
+    bt_undisturbed_place(w, place);
+    s->body_in_ice_x = place[0], s->body_in_ice_y = place[1];
     if (bt_tow_has_line(tow)) {
         observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {
@@ -229,7 +232,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
     if (has & 1u << BT_APPLIES_BODY) observe_body(w, &seen, s);
     if (has & 1u << BT_APPLIES_IMPACTS) observe_impacts(w, s);
     if (w->window) {
-        s->window_x = bt_window_low(w->window);
+        s->window_x = bt_window_low(w->window, w->undisturbed);
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }

@@ -35,6 +35,7 @@ typedef struct bt_sample {
     /// m/s of the body relative to undisturbed ice (step/undisturbed.h) and to the water: along the tow direction, and
     /// to its left
     double speed_through_ice, leeway_through_ice, speed_through_water, leeway_through_water;
+    double body_in_ice_x, body_in_ice_y; ///< m, its place in a frame that goes along with undisturbed ice
     /// N (the larger of two branches), m (the first), m, m (NaN without a line)
     double line_tension, line_length, carriage_x, carriage_y;
     double line_tension_1, line_tension_2; ///< N by branch; NaN without it

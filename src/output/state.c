@@ -71,10 +71,12 @@ static const bt_state_row tow_rows[] = {
 
 #define WINDOW(type, width, member) MEMBER(bt_window, #member, type, width, member)
 static const bt_state_row window_rows[] = {
-    WINDOW(F64, 1, start),   WINDOW(F64, 1, rear),        WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),
-    WINDOW(I64, 1, missed),  WINDOW(I64, 1, waiting),     WINDOW(I64, 1, renewed_now),
-    WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
+    WINDOW(F64, 1, start),   WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),        WINDOW(I64, 1, missed),
+    WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
 };
+/// Checkpoints of before have `rear` over ground: less the drift then.
+static const bt_state_row rear_rows[] = {MEMBER(bt_window, "rear_in_ice", F64, 1, rear)},
+                          ground_rows[] = {WINDOW(F64, 1, rear)};
 /// Not in checkpoints of before: then from here on.
 static const bt_state_row overtaken_rows[] = {WINDOW(F64, 1, most), WINDOW(F64, 1, overtaken)};
 
@@ -458,6 +460,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->window) bt_snapshot_add_rows(s, "window", rear_rows, N_OF(rear_rows), w->window);
     if (w->window) bt_snapshot_add_rows(s, "window", overtaken_rows, N_OF(overtaken_rows), w->window);
     if (w->undisturbed)
         bt_snapshot_add_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
@@ -495,6 +498,7 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
     if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
     if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
+    if (!found) found = rows_not_finite("window", rear_rows, N_OF(rear_rows), w->window, name);
     if (!found)
         found = rows_not_finite(undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed, name);
     const bt_impacts *m = w->impacts;
@@ -535,6 +539,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     // A checkpoint of before it was followed without a window: from here on, as it began.
     if (w->undisturbed && (w->window || bt_snapshot_find(s, "undisturbed/vel")))
         bt_snapshot_take_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
+    const bool ground = w->window && bt_snapshot_find(s, "window/rear");
+    if (w->window) bt_snapshot_take_rows(s, "window", ground ? ground_rows : rear_rows, 1, w->window);
+    if (ground) w->window->rear -= w->window->sign * w->undisturbed->drift_x;
     if (w->impacts && c->rank == 0) {
         free(w->impacts->open);
         w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);

@@ -231,7 +231,7 @@ static void check_window(const bt_world *w, bt_snapshot *s)
         s,
         bt_state_finite(real, sizeof real / sizeof *real) && bt_state_finite(v->dropped, 3) &&
             bt_state_finite(v->brought, 3),
-        "window/rear", -1, "and what else belongs to it are not all finite");
+        "window/rear_in_ice", -1, "and what else belongs to it are not all finite");
     bt_snapshot_want(
         s, counts(v->renewed) && counts(v->kept) && counts(v->missed) && counts(v->waiting) && counts(v->renewed_now),
         "window/renewed", -1, "and its other counters are not all counts");

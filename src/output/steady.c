@@ -9,6 +9,9 @@
 #include <string.h>
 
 #include "step/window.h"
+#include "case/case_check.h"
+#include "case/track.h"
+#include "base/elementary.h"
 #include "output/summary.h"
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
@@ -153,15 +156,16 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
         const bt_event *e = &t->events->event[i];
         if (e->kind == BT_EVENT_ADRIFT)
             decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
+        else if (e->kind == BT_EVENT_WAYPOINT && e->time > s->start && e->time < s->end &&
+                 bt_case_tow_turn(c, (int)e->subject - 1) > BT_TURN)
+            decide(s, BT_NOT_STEADY,
+                   "the course changes by %.3g deg at way-point %d, passed at %g s, within the window: end the run "
+                   "before, or read the series",
+                   bt_case_tow_turn(c, (int)e->subject - 1) * 180 / BT_PI, (int)e->subject, e->time);
         else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
             decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after",
                    e->time);
     }
-    if (t->stall.time > BT_STEADY_STALLED * s->end)
-        decide(s, BT_NOT_STEADY,
-               "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
-               "jams",
-               t->stall.time, s->end);
     if (!t->window) return;
     const double places = (double)(t->window->renewed + t->window->missed);
     if (places > 0 && (double)t->window->missed > BT_STEADY_MISSED * places)
@@ -170,6 +174,31 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
                "carries it along: take a "
                "longer domain",
                100 * (double)t->window->missed / places);
+}
+
+/// Ice that the body has opened itself, water beyond the ice, or a body that does not come on.
+static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
+{
+    const double *x = h->column[BT_COL_IN_ICE_X], *y = h->column[BT_COL_IN_ICE_Y];
+    const bt_track t = {.n = h->n, .time = h->column[BT_COL_TIME], .x = x, .y = y};
+    bt_errors found = {0};
+    bt_track_warn(c, &t, &found);
+    for (size_t k = 0; k < found.n; k++) decide(s, BT_NOT_STEADY, "%s", found.text[k]);
+    bt_errors_free(&found);
+    const double asked =
+        c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, s->end) - bt_case_tow_distance(c, s->start);
+    double way = 0;
+    for (int64_t i = s->first + 1; i < h->n; i++) way += bt_hypot(x[i] - x[i - 1], y[i] - y[i - 1]);
+    if (totals->stall.time > BT_STEADY_STALLED * s->end)
+        decide(s, BT_NOT_STEADY,
+               "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
+               "jams",
+               totals->stall.time, s->end);
+    else if (way < BT_STALL_SHARE * asked)
+        decide(s, BT_NOT_STEADY,
+               "the tow asked for %.4g m within the window, %g to %g s, and the body has gone %.3g m through ice or "
+               "water: it does not come on",
+               asked, s->start, s->end, way);
 }
 
 /// The first of the reported series with a trend that matters: the others mostly follow from it.
@@ -241,6 +270,7 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
                s->start, ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
+    judge_track(s, h, c, t);
     judge_trends(s);
     judge_contact(s, h, t);
     judge_length(s, t->dt);

@@ -8,9 +8,10 @@
 // MSER-5 finds, halfway to the end of the run at the latest, and of these the
 // latest: the ice resistance may be steady long before the tension of the line is.
 // Verdict:
-//     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within
-//                  the window, or the contacts
-//                  were not solved: the mean is that of this stretch of time, and says nothing of a longer tow
+//     not steady   the window begins within the ramp, a reported series has a trend, the tow, its course or the body
+//                  changes within the window, the body comes to its own wake, leaves the ice (case/track.h) or stands
+//                  still, or the contacts were not solved: the mean is that of this stretch of time, and says nothing
+//                  of a longer tow
 //     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load
 //     steady       none of these was found
 #ifndef BT_STEADY_H

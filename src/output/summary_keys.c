@@ -78,7 +78,7 @@ static double largest_floe(const view *v) { return v->s->impacts->largest.gid; }
 static double largest_panel(const view *v) { return v->s->impacts->largest.panel; }
 
 static bool has_window(const view *v) { return v->t->window; }
-static double window_low(const view *v) { return bt_window_low(v->t->window); }
+static double window_low(const view *v) { return bt_window_low(v->t->window, v->t->undisturbed); }
 static double window_laps(const view *v) { return bt_window_laps(v->t->window); }
 
 static double n_events(const view *v) { return v->t->events ? (double)v->t->events->n : 0; }
@@ -375,7 +375,7 @@ static const bt_json_key rows[] = {
     OF_WINDOW("moving_window.length_m", length, "m", "length of the window"),
     OF_WINDOW("moving_window.ahead_m", ahead, "m", "distance of the body from its front"),
     NUMBER("moving_window.x_m", window_low, "m", "its low end, not wrapped"),
-    NUMBER("moving_window.laps", window_laps, "1", "way that it has gone, in its lengths"),
+    NUMBER("moving_window.laps", window_laps, "1", "way that it has gone through the ice, in its lengths"),
     OF_WINDOW("moving_window.renewed", renewed, "1", "floes taken out behind and put in ahead"),
     OF_WINDOW("moving_window.waiting", waiting, "1", "floes behind it whose place ahead is not free"),
     OF_WINDOW("moving_window.kept", kept, "1", "floes that went round as they were"),

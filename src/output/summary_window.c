@@ -14,10 +14,21 @@ void bt_summary_window_print(const bt_window *v)
            bt_window_laps(v), (long long)v->renewed, (long long)v->kept, (long long)v->missed, (long long)v->waiting);
 }
 
+void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
+{
+    if (!(laps > 1)) return;
+    bt_errors_add(warnings,
+                  "the moving window has gone %.2f times its length through the ice: the body meets the same field "
+                  "again after each, with the hole in which it stood at time zero; samples a length apart are not "
+                  "independent, and the standard error may be too small; take a longer domain, or several values of "
+                  "ice.seed",
+                  laps);
+}
+
 void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
 {
     if (!v) return;
-    const double laps = bt_window_laps(v), places = (double)(v->renewed + v->missed),
+    const double places = (double)(v->renewed + v->missed),
                  floes = (double)(v->renewed + v->kept);
     if (v->overtaken > v->stride)
         bt_errors_add(warnings,
@@ -25,13 +36,7 @@ void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
                       "faster than the tow, and what came from behind was the ice of the window once more, which is "
                       "renewed ahead only; set domain.ends: periodic or open, or tow faster",
                       v->overtaken);
-    if (laps > 1)
-        bt_errors_add(warnings,
-                      "the moving window has gone %.2f times its length: the body meets the same field again after "
-                      "each, with the hole in which it stood at time zero; samples a length apart are not independent, "
-                      "and the standard "
-                      "error may be too small; take a longer domain, or several values of ice.seed",
-                      laps);
+    bt_summary_window_warn_laps(warnings, bt_window_laps(v));
     if (places > 0 && (double)v->missed > SHARE_LIMIT * places)
         bt_errors_add(
             warnings,

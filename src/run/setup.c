@@ -205,18 +205,26 @@ static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors
     return lost == 0;
 }
 
-void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+/// A world with one round floe of this size and thickness.
+static bt_world *one_floe(const bt_case *c, double size, double thickness)
 {
-    floe[0] = floe[1] = body[0] = body[1] = NAN;
-    if (c->ice.start != BT_START_DRIFT) return;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     bt_forces_setup(w, c);
-    double v[2 * BT_MAX_VERTICES], thicknesses[2];
+    double v[2 * BT_MAX_VERTICES];
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
     floe_def(c, 24, v, thickness, &d);
     bt_world_add(w, &d);
+    return w;
+}
+
+void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+{
+    floe[0] = floe[1] = body[0] = body[1] = NAN;
+    if (c->ice.start != BT_START_DRIFT) return;
+    bt_world *w = one_floe(c, size, thickness);
+    double thicknesses[2];
     bt_errors unfound = {0}; // NaN says it
     if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
     if (begin_drift(c, w, 1, &unfound)) {
@@ -226,6 +234,52 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
     }
     bt_errors_free(&unfound);
     bt_world_free(w);
+}
+
+/// Along which axes undisturbed ice rests, as step/undisturbed.h says.
+static void held_ice(const bt_case *c, double concentration, bool held[2])
+{
+    const bool dense = concentration >= BT_BOUND_CONCENTRATION, moving = c->domain.ends == BT_BOUND_MOVING;
+    held[0] = dense && c->domain.ends == BT_BOUND_WALL;
+    held[1] = (dense || moving) && c->domain.sides == BT_BOUND_WALL;
+}
+
+bt_track bt_setup_track(const bt_case *c, double size, double thickness, double concentration)
+{
+    enum { POINTS = 4000 };
+    if (c->tow.mode == BT_TOW_NONE || c->body.shape == BT_BODY_ABSENT) return (bt_track){0};
+    bt_case coarse = *c;
+    coarse.run.dt = c->run.duration / (POINTS - 1);
+    bt_world *w = one_floe(&coarse, size, thickness);
+    w->environment = bt_environment_create(&coarse);
+    bt_errors unfound = {0};
+    begin_drift(&coarse, w, 1, &unfound); // where it is not found from rest, as undisturbed ice goes on
+    bt_errors_free(&unfound);
+    bool held[2];
+    held_ice(c, concentration, held);
+    bt_undisturbed_create(w, 1, held);
+    bt_tow *tow = bt_setup_tow(c);
+    double *time = bt_alloc(POINTS, sizeof *time), *x = bt_alloc(POINTS, sizeof *x), *y = bt_alloc(POINTS, sizeof *y);
+    for (int i = 0; i < POINTS; i++, w->step++) {
+        double d[2];
+        time[i] = c->run.duration * i / (POINTS - 1);
+        bt_setup_tow_displacement(c, tow, bt_case_tow_distance(c, time[i]), d);
+        x[i] = c->body.x + d[0] - w->undisturbed->drift_x;
+        y[i] = c->body.y + d[1] - w->undisturbed->drift_y;
+        bt_environment_begin(w);
+        bt_undisturbed_advance(w);
+    }
+    bt_tow_free(tow);
+    bt_world_free(w);
+    return (bt_track){.n = POINTS, .time = time, .x = x, .y = y};
+}
+
+void bt_setup_track_free(bt_track *t)
+{
+    free((double *)t->time);
+    free((double *)t->x);
+    free((double *)t->y);
+    *t = (bt_track){0};
 }
 
 static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
@@ -293,7 +347,7 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double fr
 static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
 {
     d[0] = w->bodies.vel[m].x * t, d[1] = w->bodies.vel[m].y * t;
-    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, t, d);
+    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, bt_case_tow_led(c, t), d);
 }
 
 /// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
@@ -301,11 +355,12 @@ static bool meet(const bt_case *c, const bt_world *w, bt_idx i, bt_idx j, bool w
 {
     const bool bent = c->tow.n_waypoints > 0 && (i == w->towed || j == w->towed);
     const int pieces = bent ? 500 : 1;
+    const double end = (double)bt_case_steps(c) * c->run.dt;
     double from[2] = {0, 0};
     for (int k = 1; k <= pieces; k++) {
         double di[2], dj[2];
-        displacement(c, w, i, c->run.duration * k / pieces, di);
-        displacement(c, w, j, c->run.duration * k / pieces, dj);
+        displacement(c, w, i, end * k / pieces, di);
+        displacement(c, w, j, end * k / pieces, dj);
         const double to[2] = {dj[0] - di[0], dj[1] - di[1]};
         if (wall && (w->bodies.motion[j] == BT_STATIC || (to[0] == 0 && to[1] == 0))) return false;
         if (!apart_on_path(w, j, i, from, to[0] - from[0], to[1] - from[1])) return true;
@@ -451,9 +506,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
-    const bool dense = f->concentration >= BT_BOUND_CONCENTRATION, moving = c->domain.ends == BT_BOUND_MOVING;
-    const bool held[2] = {dense && c->domain.ends == BT_BOUND_WALL,
-                          (dense || moving) && c->domain.sides == BT_BOUND_WALL};
+    bool held[2];
+    held_ice(c, f->concentration, held);
     if (with_body) bt_undisturbed_create(w, r->n_floes, held);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);

@@ -6,6 +6,7 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"
+#include "case/track.h"
 #include "output/roster.h"
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
@@ -15,6 +16,12 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_r
 /// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed
 /// body into body, m/s; NaN where ice.start, the tow or a velocity that is given has it otherwise.
 void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2]);
+
+/// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it
+/// pulls), with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration.
+/// Empty without a tow. Release with bt_setup_track_free.
+bt_track bt_setup_track(const bt_case *c, double size, double thickness, double concentration);
+void bt_setup_track_free(bt_track *t);
 
 /// Constants of the step from the case. size: mean floe size, m.
 bt_params bt_setup_params(const bt_case *c, double size);

@@ -62,9 +62,8 @@ bt_tow *bt_setup_tow(const bt_case *c)
     return t;
 }
 
-void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double time, double d[2])
+void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double way, double d[2])
 {
-    const double way = bt_case_tow_distance(c, time);
     d[0] = way * bt_cos(c->tow.direction);
     d[1] = way * bt_sin(c->tow.direction);
     if (t->path.n == 0) return;

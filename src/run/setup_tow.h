@@ -8,7 +8,7 @@
 /// The tow at time zero of a case that was checked; release with bt_tow_free.
 bt_tow *bt_setup_tow(const bt_case *c);
 
-/// Displacement of the body at a prescribed velocity from its start until time t, m.
-void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double time, double d[2]);
+/// Displacement from the start after this way of the tow, m.
+void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double way, double d[2]);
 
 #endif

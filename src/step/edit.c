@@ -66,7 +66,7 @@ static void unwrap(bt_world *w, bt_idx i, const bt_pose *was)
 {
     const bt_pose *p = &w->bodies.pose[i];
     if (w->window && w->bodies.gid[i] < w->window->n_floes)
-        w->bodies.home[i].lap = bt_window_lap(w->window, p->x);
+        w->bodies.home[i].lap = bt_window_lap(w, p->x);
     if (!w->tow || i != bt_world_towed(w)) return;
     w->tow->travel_x += p->x - was->x;
     w->tow->travel_y += p->y - was->y;

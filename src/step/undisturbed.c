@@ -6,6 +6,7 @@
 
 #include "body/bodies.h"
 #include "force/forces.h"
+#include "tow/tow.h"
 
 /// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
 /// no direction has a width of its own. Mean width of a convex outline: perimeter / π (Cauchy).
@@ -70,4 +71,11 @@ void bt_undisturbed_advance(bt_world *w)
     v->vel = u;
     v->drift_x += w->par.dt * u.x;
     v->drift_y += w->par.dt * u.y;
+}
+
+void bt_undisturbed_place(const bt_world *w, double at[2])
+{
+    const bt_undisturbed *v = w->undisturbed;
+    at[0] = w->tow->travel_x - (v ? v->drift_x : 0);
+    at[1] = w->tow->travel_y - (v ? v->drift_y : 0);
 }

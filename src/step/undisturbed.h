@@ -28,4 +28,7 @@ void bt_undisturbed_create(bt_world *w, bt_gid n_floes, const bool held[2]);
 /// At the end of a step: it drifts on. Nothing where there is none.
 void bt_undisturbed_advance(bt_world *w);
 
+/// Place of the towed body in the frame that drifts with this ice (where there is none, over ground), not wrapped, m.
+void bt_undisturbed_place(const bt_world *w, double at[2]);
+
 #endif

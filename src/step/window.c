@@ -19,7 +19,6 @@
 #include "geometry/apart.h"
 #include "base/elementary.h"
 
-#define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
 #define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
 
 /// A floe that could go, and the place it would take.
@@ -32,7 +31,13 @@ typedef struct candidate {
     bool stays;
 } candidate;
 
-static double body_at(const bt_world *w) { return w->window->sign * w->tow->travel_x; }
+/// s of the body.
+static double body_at(const bt_world *w)
+{
+    double at[2];
+    bt_undisturbed_place(w, at);
+    return w->window->sign * at[0];
+}
 
 void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
 {
@@ -40,20 +45,22 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
     const double length = w->par.period_x, zone = ZONE_SHARE * ahead;
     bt_window *v = w->window = bt_alloc(1, sizeof *v);
     *v = (bt_window){.sign = sign, .length = length, .ahead = ahead, .zone = zone, .n_floes = n_floes};
-    v->stride = bt_min(STRIDE_SIZES * w->par.size, bt_min(0.25 * zone, length / 16));
+    v->stride = bt_min(BT_WINDOW_STRIDE * w->par.size, bt_min(0.25 * zone, length / 16));
     v->start = v->rear = body_at(w) + ahead - length;
-    v->most = sign * (w->tow->travel_x - w->undisturbed->drift_x);
+    v->most = body_at(w);
     for (bt_idx i = 0; i < b->n; i++) {
         const double x = b->pose[i].x;
         bt_home *h = &b->home[i];
         *h = (bt_home){.x = x, .y = b->pose[i].y, .yaw = b->pose[i].yaw};
         if (b->gid[i] >= n_floes) continue;
-        h->copy = h->lap = bt_window_lap(v, x);
+        h->copy = h->lap = bt_window_lap(w, x);
     }
 }
 
-int32_t bt_window_lap(const bt_window *v, double x)
+int32_t bt_window_lap(const bt_world *w, double x)
 {
+    const bt_window *v = w->window;
+    x -= w->undisturbed->drift_x;
     // the copy that lies within [rear, rear + L)
     return (int32_t)(v->sign > 0 ? ceil((v->rear - x) / v->length) : floor((-x - v->rear) / v->length));
 }
@@ -63,15 +70,16 @@ static bool renewable(const bt_world *w, bt_idx i)
     return w->bodies.gid[i] < w->window->n_floes && w->bodies.motion[i] == BT_DYNAMIC;
 }
 
-/// σx of the home of floe i, and of the floe itself.
+/// s of the home of floe i, and of the floe itself.
 static double home_at(const bt_world *w, bt_idx i)
 {
     const bt_home *h = &w->bodies.home[i];
-    return w->window->sign * (h->x + w->undisturbed->drift_x + h->copy * w->window->length);
+    return w->window->sign * (h->x + h->copy * w->window->length);
 }
 static double floe_at(const bt_world *w, bt_idx i)
 {
-    return w->window->sign * (w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length);
+    const double x = w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length;
+    return w->window->sign * (x - w->undisturbed->drift_x);
 }
 
 /// Has the rear passed the home of floe i, and may the floe be taken from where it is?
@@ -349,10 +357,10 @@ void bt_window_begin(bt_world *w)
     bt_window *v = w->window;
     if (!v) return;
     v->renewed_now = 0;
-    const double way = v->sign * (w->tow->travel_x - w->undisturbed->drift_x);
-    v->most = bt_max(v->most, way);
-    v->overtaken = bt_max(v->overtaken, v->most - way);
-    const double behind = body_at(w) + v->ahead - v->length - v->rear;
+    const double body = body_at(w);
+    v->most = bt_max(v->most, body);
+    v->overtaken = bt_max(v->overtaken, v->most - body);
+    const double behind = body + v->ahead - v->length - v->rear;
     if (!(behind >= v->stride)) return; // a body that drifts back does not take the window with it
     v->rear += v->stride * floor(behind / v->stride);
     size_t n;

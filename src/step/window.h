@@ -2,12 +2,15 @@
 // Moving window (domain.ends: moving): the domain goes with the towed body, ice enters ahead and is dropped behind.
 //
 // Space is periodic along x with the window's length L, as in ends: periodic, and the field is made for that: it has no
-// seam. With s = σ x, σ = ±1 the sign of the tow along x, the window covers [rear, rear + L) and `rear` follows the
-// body, which so keeps its distance `ahead` from the front. Every floe has a home: its pose in the field as made (the
-// mother field), which goes on beyond the window, repeated with L and drifting as undisturbed ice does:
+// seam. Every floe has a home: its pose in the field as made (the mother field), which goes on beyond the window,
+// repeated with L and drifting as undisturbed ice does:
 //     X_i(t) = home_i + drift(t) + copy_i L
-// A floe is due when the rear has passed its home, σ X_i < rear, and itself, σ x_i < rear; one that the body has pushed
-// ahead is taken from inside by as much as it is late, rear − σ X_i, but not from the half next to the body of what
+// What counts is the way of the body through that ice: ice that drifts past a body that stands is as much renewed as
+// ice at rest that a body is towed through. So the window is one of the ice: in the frame that drifts with it,
+// with s = σ (x − drift), σ = ±1 the sign of the tow along x, it covers [rear, rear + L), and `rear` follows the body,
+// which so keeps its distance `ahead` from the front. A floe is due when the rear has passed its home, s(X_i) < rear,
+// and itself, s(x_i) < rear; one that the body has pushed
+// ahead is taken from inside by as much as it is late, rear − s(X_i), but not from the half next to the body of what
 // lies behind it. It is renewed when its next place, X_i + σL at the front, is free of all floes that stay: it is put
 // there with the velocity of undisturbed ice. Floes whose places hold each other go at once. So the number of bodies,
 // their ids and the memory stay, and what enters is the mother field as it was made.
@@ -27,6 +30,10 @@
 
 #include "step/undisturbed.h"
 
+/// Mean floe diameters by which the rear moves on at most: renewing costs new labels, so it is done for many floes at
+/// once.
+#define BT_WINDOW_STRIDE 2.0
+
 typedef struct bt_window {
     // constants
     double sign;          ///< σ
@@ -35,7 +42,7 @@ typedef struct bt_window {
     double zone;          ///< depth of the front zone, m
     bt_gid n_floes;       ///< bodies below this id are renewed
     // state
-    double start, rear;   ///< σx of the rear end at first and now, m
+    double start, rear;   ///< s of the rear end at first and now, m
     double most;          ///< the largest way of the body through undisturbed ice so far, along σx, m
     double overtaken;     ///< by how much it has fallen behind that, at most: ice came past it from behind, m
     int64_t renewed, kept, missed; ///< in all
@@ -54,12 +61,15 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes);
 void bt_window_begin(bt_world *w);
 
 /// Low end of the window, x in m.
-static inline double bt_window_low(const bt_window *v) { return v->sign > 0 ? v->rear : -(v->rear + v->length); }
+static inline double bt_window_low(const bt_window *v, const bt_undisturbed *ice)
+{
+    return (v->sign > 0 ? v->rear : -(v->rear + v->length)) + ice->drift_x;
+}
 
 /// Periods that a body in the window at x lies above it.
-int32_t bt_window_lap(const bt_window *v, double x);
+int32_t bt_window_lap(const bt_world *w, double x);
 
-/// Windows that have gone by: way of the rear over the length.
+/// Windows of ice that have gone by: way of the rear through the ice over the length.
 static inline double bt_window_laps(const bt_window *v) { return (v->rear - v->start) / v->length; }
 
 /// Of the window and of the undisturbed ice.

@@ -94,7 +94,8 @@ void bt_tow_advance(bt_world *w)
         bt_tow_finish_vessel(t);
         t->carriage_x += dt * t->vessel.vx;
         t->carriage_y += dt * t->vessel.vy;
-        led = t->vessel.way = bt_path_near(&t->path, t->vessel.way, t->carriage_x, t->carriage_y);
+        const double near = bt_path_near(&t->path, t->vessel.way, t->carriage_x, t->carriage_y);
+        led = t->vessel.way = bt_max(near, t->vessel.way + BT_VESSEL_WAY * dt * bt_max(0, t->vessel.vd2));
     } else if (t->path.n > 0) {
         double at[2], tangent[2];
         bt_path_at(&t->path, t->way, at, tangent);

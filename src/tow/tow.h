@@ -16,7 +16,10 @@
 //
 // Vessel (mode thrust). A point of mass M (with added mass) that touches no ice [assumed], on the end of the line.
 // Course d: towards the point of the planned path that lies `lookahead` ahead of the vessel's own place on it
-// (line-of-sight guidance, Fossen 2011). Relative to the water it has speed s along d:
+// (line-of-sight guidance, Fossen 2011). Its place is its projection, and goes on by BT_VESSEL_WAY of what the vessel
+// makes good along d at least: before a corner of more than 90° the point ahead may lie abeam, and steering there does
+// not change the projection, so that both would stay where they are for ever. Less than all of the way made good, since
+// on a leg the projection does more than that, and then holds. Relative to the water it has speed s along d:
 //     drag     R = (R_f/s_f²) |u| u along d, `lateral` times as much across
 //     thrust   0 ≤ T ≤ T_b − (T_b − R_f)(s/s_f)² along d
 //     governor T is as large as it can be without the speed over ground along d exceeding the programme's; never astern
@@ -44,6 +47,7 @@
 #include "bergtow/world.h"
 
 enum { BT_MAX_BRANCHES = 2 };
+#define BT_VESSEL_WAY 0.5 ///< of the vessel's way, assumed
 
 /// One elastic line.
 typedef struct bt_branch {

@@ -93,6 +93,28 @@ def test_speeds_that_were_not_measured_are_those_ordered(tmp_path):
     assert estimates["speed_along_m_s"] == estimates["ordered_speed_m_s"] == 0.3
 
 
+def test_a_window_that_went_over_ground_goes_on_in_the_ice(tmp_path):
+    """Red when its rear is missed, or is taken for one in the ice: that drifts, and no floe is renewed from then on."""
+    case = {
+        "run": {"dt": 0.1, "duration": 60}, "domain": {"length": 14, "width": 6, "ends": "moving", "sides": "periodic"},
+        "ice": {"concentration": 0.4, "size": 0.8}, "body": {"length": 1, "draft": 0.3},
+        "tow": {"speed": 0.4, "ramp": 0}, "water": {"current_x": -0.2}
+    }
+    whole = run(tmp_path, case, "--quiet", name="whole")
+    run(tmp_path, case, "--quiet", "--steps", 300, name="cut")
+    with h5py.File(tmp_path / "cut/checkpoint.h5", "r+") as f, h5py.File(tmp_path / "cut/result.h5", "r+") as old:
+        f["window/rear"] = f["window/rear_in_ice"][()] + f["window/drift_x"][()]
+        del f["window/rear_in_ice"]
+        for name in ("body_in_ice_x", "body_in_ice_y"):
+            del f["history"][name], old["series"][name]
+    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
+    seal(tmp_path / "cut/result.h5", "result 1")
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == DONE, result.stderr
+    cut, all_ = (r.summary["moving_window"] for r in (Run(tmp_path / "cut", result), whole))
+    assert cut["renewed"] == all_["renewed"] > 0 and abs(cut["laps"] - all_["laps"]) < 1e-9 and all_["laps"] > 2
+
+
 def test_numbers_where_only_dimensions_are_written(tmp_path):
     run(tmp_path, changed(CRUSHING, run__duration=6), "--steps", 30, name="cut")
     (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)

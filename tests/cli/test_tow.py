@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, call, changed, run, warned
+from harness import CASE, call, changed, run, warned, write_case
 
 # A vessel on a bridle round two corners through loose ice with current and Coriolis force.
 VESSEL = {
@@ -231,3 +231,32 @@ def test_a_vessel_in_a_moving_window(tmp_path):
     assert np.abs(thrust - vdrag - vinertia - vline).max() <= 1e-9 * np.abs([thrust, vdrag, vinertia, vline]).max()
     assert r.series("body_x")[-1] < -300 and np.nansum(r.series("window_renewed")) > 0
     assert run(tmp_path, r.dir / "case.resolved.yml", "--quiet", name="again").hash == r.hash
+
+
+def test_a_turn_within_the_window_is_no_steady_tow(tmp_path):
+    """A corner that a body at a set speed takes within one step has a force as large as the step is short: both are
+    said, and a course that is straight, or bends before the window or beyond the end, is not."""
+    def told(**tow):
+        case = changed(BASE_TURN, tow={**BASE_TURN["tow"], **tow})
+        text = call("check", write_case(tmp_path, case)).stdout
+        return "turns at way-point 1 within one step" in text, run(tmp_path, case, "--quiet", "--force").summary
+
+    sharp, s = told(waypoints=[[100, 0], [150, 50]])
+    assert sharp and s["window"]["verdict"] == "not steady"
+    assert "the course changes by 45 deg at way-point 1, passed at 200 s" in s["window"]["reason"]
+    assert any("turns at way-point 1" in w for w in s["warnings"])
+    sharp, s = told(waypoints=[[100, 0], [150, 50]], turn_radius=40)
+    assert not sharp and "the course changes by 45 deg" in s["window"]["reason"]
+    for points in ([[100, 0], [150, 0]], [[500, 0], [550, 50]], [[10, 0], [300, 100]]):
+        sharp, s = told(waypoints=points)
+        assert sharp == (points[0][0] == 10) and "the course changes" not in (s["window"]["reason"] or "")
+    assert "tow.programme: from 0 to 0.5 m/s in less than a step" in call("check", write_case(
+        tmp_path, changed(BASE_TURN, tow={"programme": [[10, 0], [10.5, 0.5]]}))).stdout
+
+
+BASE_TURN = {
+    "run": {"dt": 1, "duration": 400}, "domain": {"frame": "geographic", "length": 1000, "width": 1000, "ends": "open",
+                                                  "sides": "open"},
+    "ice": {"concentration": 0}, "body": {"length": 30, "draft": 20}, "tow": {"speed": 0.5, "ramp": 0},
+    "output": {"window_start": 50},
+}

@@ -203,3 +203,98 @@ def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
         said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
     short = run(tmp_path, case, "--steps", 45, name="short")
     assert not any("reaches the wall" in w for w in short.summary["warnings"])
+
+
+# 30 m disc at 0.5 m/s; 400 m of ice, or what the domain is set to.
+ROUND = {
+    "run": {"dt": 2, "duration": 1600},
+    "domain": {"frame": "geographic", "length": 400, "width": 300, "ends": "periodic", "sides": "periodic"},
+    "ice": {"concentration": 0.4, "size": 25, "thickness": 1},
+    "body": {"length": 30, "draft": 20},
+    "tow": {"speed": 0.5, "ramp": 0},
+    "output": {"frame_interval": 1600},
+}
+OPENED = "the body meets ice that it has opened before"
+# changes, and the time from which on the body meets its own wake: within its own length of the period
+WAKES = {
+    "along": ({}, 2 * (400 - 30)),
+    "across": ({"tow__direction": 90}, 2 * (300 - 30)),
+    "held in a current": ({"tow__speed": 0, "water": {"current_x": -0.5}}, 2 * (400 - 30)),
+    "with the ice": ({"water": {"current_x": 0.4}}, None),
+    "past it": ({"tow__direction": 26.6}, None),
+    "beside it": ({"tow__direction": 4}, 2 * (401 - 13)),
+    "to and fro": ({"tow__speed": 0, "water": {"tide": {"major": 0.5, "period": 800}}}, None),
+    "renewed": ({"domain__ends": "moving"}, None),
+    "round a moving window": ({"domain__ends": "moving", "tow__speed": 0.02, "water": {"current_y": -0.5}},
+                              2 * (300 - 28)),
+    "between walls": ({"domain": {**ROUND["domain"], "length": 900, "ends": "wall"}, "body__x": -440}, None),
+    "open water": ({"ice__concentration": 0}, None),
+}
+
+
+@pytest.mark.parametrize("name", WAKES)
+def test_a_body_that_comes_to_its_own_wake_is_no_steady_tow(tmp_path, name):
+    changes, begins = WAKES[name]
+    case = changed(ROUND, **changes)
+    if name == "between walls":
+        case["body"]["x"] = -400
+    checked = call("check", write_case(tmp_path, case)).stdout
+    assert (OPENED in checked) == (begins is not None), checked
+    if begins is None:
+        return
+    r = run(tmp_path, case, "--quiet", "--force")
+    reason = r.summary["window"]["reason"]
+    assert r.summary["window"]["verdict"] == "not steady"
+    for text in (checked, reason):
+        at = float(re.search(rf"from ([0-9.e+]+) s on {OPENED}", text)[1])
+        assert at == pytest.approx(begins, rel=0.03), text
+
+
+def test_a_resumed_run_knows_where_it_has_been(tmp_path):
+    whole = run(tmp_path, ROUND, "--quiet", name="whole")
+    run(tmp_path, ROUND, "--quiet", "--steps", 500, name="cut")
+    assert call("resume", "cut", "--quiet", cwd=tmp_path).returncode == DONE
+    cut = json.loads((tmp_path / "cut/summary.json").read_text())
+    assert (cut["window"], cut["state_hash"]) == (whole.summary["window"], whole.summary["state_hash"])
+    assert OPENED in cut["window"]["reason"]
+
+
+LEFT = "the body leaves the ice at"
+
+
+@pytest.mark.parametrize("changes, at", [
+    ({}, 400), ({"domain__sides": "open", "tow__direction": 90}, 300),
+    ({"tow__speed": 0, "water": {"current_x": -0.5}}, 400), ({"water": {"current_x": 0.25}}, 800),
+    ({"domain__ends": "wall", "domain__x0": -200, "domain__length": 1200, "ice__x_max": 200}, 400),
+    ({"ice__concentration": 0}, None), ({"run__duration": 300}, None), ({"domain__ends": "periodic"}, None),
+])
+def test_a_body_that_leaves_the_ice_is_no_steady_tow(tmp_path, changes, at):
+    """Red as "too short ... run longer", with a mean of open water, and without a word in check."""
+    case = changed(ROUND, **{"domain__ends": "open", "run__duration": 1000, **changes})
+    checked = call("check", write_case(tmp_path, case)).stdout
+    assert (LEFT in checked) == (at is not None), checked
+    if at is None:
+        return
+    r = run(tmp_path, case, "--quiet")
+    assert r.summary["window"]["verdict"] == "not steady"
+    for text in (checked, r.summary["window"]["reason"]):
+        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(at, rel=0.02), text
+
+
+def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
+    """A vessel that pulls next to nothing, in open water, where nothing holds the body."""
+    case = changed(BERG, ice={"concentration": 0}, run__duration=600, tow={
+        "mode": "thrust", "speed": 0.5, "ramp": 10, "line_length": 400, "line_stiffness": "100 MN",
+        "line_damping": "500 kN s/m", "vessel": {"mass": "5000 t", "bollard_pull": 100, "free_speed": 8}})
+    window = run(tmp_path, case, "--quiet").summary["window"]
+    assert window["verdict"] == "not steady" and "it does not come on" in window["reason"], window
+
+
+def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
+    """Red at the 0.02 m/s of the tow: the ice comes at 0.5."""
+    case = changed(ROUND, domain__ends="moving", tow__speed=0.02, water={"current_x": -0.48}, run__dt=10)
+    checked = call("check", write_case(tmp_path, case)).stdout
+    assert "move 0.198 of their size" in checked and "TOO LARGE" in checked, checked
+    assert "solver.reference_speed: 0.02 m/s, and the ice comes at up to 0.494 m/s" in checked, checked
+    still = call("check", write_case(tmp_path, ROUND)).stdout
+    assert "move 0." not in still and "solver.reference_speed" not in still, still

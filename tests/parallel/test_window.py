@@ -201,3 +201,20 @@ def test_check_tells(tmp_path):
     run(tmp_path, changed(SPEED, run__duration=0.2))
     result = call("check", tmp_path / "case.yml")
     assert result.returncode == DONE and "moving window        the body keeps 15.6 m from its front" in result.stdout
+
+
+def test_ice_that_drifts_past_a_body_is_renewed_as_that_which_it_is_towed_through(tmp_path):
+    """Red when the window goes by the way over ground: of a body that is held nothing was renewed, and the ice that it
+    had opened came back as it was (a thirtieth of the force)."""
+    case = changed(SPEED, domain__width=14, run__duration=150, ice__concentration=0.5, ice__restitution=0, tow__ramp=0,
+                   tow__speed=0.5, solver={"reference_speed": 0.5}, water={"current_x": 0})
+    found = []
+    for speed in (0.5, 0.1, 0):
+        r = run(tmp_path, changed(case, tow__speed=speed, water__current_x=speed - 0.5), "--quiet", name=f"at {speed}")
+        w, ice = r.summary["moving_window"], r.series("ice_resistance")
+        found.append((w["laps"], w["renewed"] + w["missed"], ice[400:].mean()))
+        assert warned(r, "gone 2\\.[0-9]+ times its length through the ice")
+        assert np.all(np.diff(r.series("body_in_ice_x")) > 0)
+    laps, places, force = np.array(found).T
+    assert np.ptp(laps) < 0.1 and np.ptp(places) < 0.1 * places[0]
+    assert force.min() > 0.6 * force.max(), force

@@ -520,6 +520,35 @@ static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
     bt_world_free(w);
 }
 
+/// Way-points whose course changes by more than 90°, sharp or round: on the leg before, the point ahead can lie abeam
+/// of the vessel, which once hung there for ever.
+static void a_vessel_turns_back(void **state)
+{
+    (void)state;
+    const struct { double degrees, radius;
+    } corner[] = {{97, 0}, {120, 0}, {120, 5}, {150, 2}, {179, 0}};
+    for (size_t k = 0; k < sizeof corner / sizeof *corner; k++) {
+        bt_world *w = tow_world(1, 50, (bt_drag){.water_skin = 30, .yaw = 30});
+        bt_tow *t = w->tow;
+        char why[200];
+        t->mode = BT_TOW_THRUST;
+        t->n_branches = 1;
+        t->branch[0] = (bt_branch){.length0 = 10, .k = 100, .c = 100};
+        t->carriage_x = 10;
+        t->vessel = (bt_vessel){
+            .mass = 500, .bollard_pull = 300, .free_speed = 6, .free_resistance = 100, .lateral = 20, .lookahead = 20};
+        const double a = corner[k].degrees * BT_PI / 180, x = 60 + 200 * cos(a), y = 200 * sin(a);
+        assert_true(bt_path_make(&t->path, 10, 0, 2, (double[]){60, 0, x, y}, corner[k].radius, why));
+        t->speed = 1;
+        for (int s = 0; s < 400; s++) bt_world_step(w);
+        assert_int_equal(t->mark, 2);
+        // on the leg after, on its line
+        CHECK_CLOSE((t->carriage_y - y) * cos(a) - (t->carriage_x - x) * sin(a), 0, 0.1);
+        assert_true((t->carriage_x - x) * cos(a) + (t->carriage_y - y) * sin(a) > 0);
+        bt_world_free(w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -538,6 +567,7 @@ int main(void)
         cmocka_unit_test(rows_and_contacts_are_one_system),
         cmocka_unit_test(the_end_follows_the_path_exactly),
         cmocka_unit_test(a_vessel_keeps_its_track_and_passes_the_waypoints),
+        cmocka_unit_test(a_vessel_turns_back),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,7 +64,10 @@ static void cross_checks_refuse(void **state)
         {"tow.programme=[[0,0],[5,1]];tow.speed=2", "has no effect with tow.programme, whose largest speed is 1 m/s"},
         {"tow.programme=[[0,0],[5,1]];tow.ramp=4", "reaches its largest speed at 5 s"},
         {"tow.mode=none;tow.programme=[[0,1]]", "has no effect with tow.mode: none"},
-        {"body.shape=square;tow.programme=[[0,8],[10,8]]", "a wall stands after 67 m; shorten the run to 8.37 s"},
+        {"body.shape=square;tow.programme=[[0,8],[10,8]]", "a wall stands after 67 m; shorten the run to 8.3 s"},
+        // on a rise a step goes farther than the time that it takes
+        {"body.shape=square;tow.speed=12.5;tow.ramp=9.5;run.dt=0.5",
+         "the tow is 68.75 m long and a wall stands after 67 m"},
         {"tow.waypoints=[]", "has 0 points"},
         {"tow.waypoints=[[9,0],[9,0]]", "way-point 2 is where the one before it"},
         {"tow.turn_radius=3", "no effect without tow.waypoints"},

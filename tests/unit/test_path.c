@@ -54,6 +54,16 @@ static void paths_have_the_lengths_of_their_legs_and_arcs(void **state)
     CHECK_CLOSE(length_of(&p, 260, 0.001), 260, 1e-5);
     bt_path_free(&p);
 
+    // From far outside of an arc, where going along its tangent leads ever farther away; either way round.
+    for (int side = -1; side <= 1; side += 2) {
+        assert_true(bt_path_make(&p, 0, 0, 2, (double[]){100, 0, 100, side * 100.0}, r, why));
+        for (double angle = 0.1; angle < 0.5 * BT_PI; angle += 0.1) {
+            const double far = 3.5 * r, x = 90 + far * sin(angle), y = side * (r - far * cos(angle));
+            CHECK_CLOSE(bt_path_near(&p, 90 + r * 0.7, x, y), 90 + r * angle, 1e-9);
+        }
+        bt_path_free(&p);
+    }
+
     assert_false(bt_path_make(&p, 0, 0, 3, points, 26, why)); // two tangents of 26 m on a leg of 50 m
     assert_non_null(strstr(why, "way-point 2"));
     assert_false(bt_path_make(&p, 0, 0, 2, (double[]){10, 0, 10, 0}, 0, why));

@@ -126,7 +126,7 @@ static const struct change {
     {1, "tiles/n_x", 0, 1, NULL},
     {1, "bodies/lap", 2, 2147483647, NULL},
     {1, "bodies/copy", 2, -2147483648.0, NULL},
-    {1, "window/rear", 0, NAN, NULL},
+    {1, "window/rear_in_ice", 0, NAN, NULL},
     {1, "window/drift_x", 0, 1e300, NULL},
     {1, "window/renewed", 0, -1, NULL},
 };

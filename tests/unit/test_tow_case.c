@@ -80,6 +80,20 @@ static void way_of_a_programme(void **state)
     CHECK_CLOSE(bt_case_tow_distance(&c, 500), 145, 1e-12);
     CHECK_CLOSE(bt_case_tow_time(&c, 5 + 20 + 52.5), 65, 1e-9);
     bt_tow *t = bt_setup_tow(&c);
+    // A step goes at the speed of its end, which is farther on a rise: what a wall ahead is held against.
+    double led = 0;
+    for (int k = 1; k <= 700; k++) {
+        c.run.dt = 0.173;
+        led += c.run.dt * bt_tow_speed(t, k * c.run.dt);
+        CHECK_CLOSE(bt_case_tow_led(&c, (k - 0.5) * c.run.dt), led, 1e-9);
+        CHECK_CLOSE(bt_case_tow_led(&c, k * c.run.dt), led, 1e-9);
+    }
+    CHECK_CLOSE(led, 145.0, 0.2);
+    c.run.duration = 500;
+    for (double way = 1; way < 144; way += 1.7) {
+        const double time = bt_case_tow_last(&c, way);
+        assert_true(bt_case_tow_led(&c, time) <= way && bt_case_tow_led(&c, time + c.run.dt) > way);
+    }
     double way = 0, way_to = 57.3;
     for (int i = 0; i < 57300; i++) way += 1e-3 * bt_tow_speed(t, (i + 0.5) * 1e-3);
     CHECK_CLOSE(way, bt_case_tow_distance(&c, way_to), 1e-6);

@@ -90,7 +90,7 @@ static void come_back_as_they_were(void **state)
         }
         add_body_and_window(w, sign, speed);
         const double start = w->window->rear;
-        assert_true(fabs(bt_window_low(w->window)) < 1e-9);
+        assert_true(fabs(bt_window_low(w->window, w->undisturbed)) < 1e-9);
         for (int k = 0; k < N; k++) {
             move(w, k, 0.3 * (k % 2 ? 1 : -1), 0.2, 0.5);
             w->bodies.vel[bt_world_index(w, k)] = (bt_vel){.x = 0.01 * sign, .y = 0.005, .w = 0.02};

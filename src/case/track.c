@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// Speed, wake and end of a track; the rules are in case/track.h.
+#include "case/track.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/elementary.h"
+#include "bergtow/shape.h"
+#include "case/case_check.h"
+
+#define MOST_POINTS 20000.0 // of a track whose wake is sought: each is compared with all before
+
+static double between(const bt_track *t, int64_t i, int64_t j)
+{
+    return bt_hypot(t->x[j] - t->x[i], t->y[j] - t->y[i]);
+}
+
+double bt_track_speed(const bt_track *t)
+{
+    double most = 0;
+    for (int64_t i = 1; i < t->n; i++)
+        most = bt_max(most, between(t, i - 1, i) / (t->time[i] - t->time[i - 1]));
+    return most;
+}
+
+/// The largest way along the sign of the tow, and by how much it falls behind that.
+static double farthest(const bt_case *c, const bt_track *t, double *fall)
+{
+    const double sign = bt_case_tow_sign(c);
+    double most = 0;
+    *fall = 0;
+    for (int64_t i = 0; i < t->n; i++) {
+        const double way = sign * (t->x[i] - t->x[0]);
+        most = bt_max(most, way);
+        *fall = bt_max(*fall, most - way);
+    }
+    return most;
+}
+
+double bt_track_laps(const bt_case *c, const bt_track *t)
+{
+    double fall;
+    return farthest(c, t, &fall) / c->domain.length;
+}
+
+double bt_track_fall(const bt_case *c, const bt_track *t)
+{
+    double fall;
+    farthest(c, t, &fall);
+    return fall;
+}
+
+/// d less whole periods, as near to 0 as that gets.
+static double nearest(double d, double period) { return period > 0 ? d - period * nearbyint(d / period) : d; }
+
+/// First point that lies less than `size` from an earlier one, around a period; t->n without. Of a track that is
+/// thinned out to an eighth of that, against one of half of it.
+static int64_t first_in_wake(const bt_track *t, const double period[2], double size)
+{
+    if (!(period[0] > 0 || period[1] > 0)) return t->n;
+    double way = 0;
+    for (int64_t i = 1; i < t->n; i++) way += isnan(t->x[i - 1]) ? 0 : between(t, i - 1, i);
+    const double apart = bt_max(0.5 * size, way / MOST_POINTS);
+    int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, last = 0, found = t->n;
+    for (int64_t i = 0; i < t->n && found == t->n; i++) {
+        if (isnan(t->x[i]) || (n > 0 && between(t, last, i) < 0.25 * apart)) continue;
+        last = i;
+        for (int64_t k = 0; k < n && found == t->n; k++) {
+            const double dx = t->x[i] - t->x[kept[k]], dy = t->y[i] - t->y[kept[k]], x = nearest(dx, period[0]),
+                         y = nearest(dy, period[1]);
+            if ((x != dx || y != dy) && bt_hypot(x, y) < size) found = i;
+        }
+        if (n == 0 || between(t, kept[n - 1], i) >= apart) kept[n++] = i;
+    }
+    free(kept);
+    return found;
+}
+
+/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was.
+static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size)
+{
+    const bt_bound kind[2] = {c->domain.ends, c->domain.sides};
+    const double first[2] = {c->domain.x0, c->domain.y0}, extent[2] = {c->domain.length, c->domain.width};
+    double low[2] = {c->ice.x_min, c->ice.y_min}, high[2] = {c->ice.x_max, c->ice.y_max};
+    for (int k = 0; k < 2; k++) {
+        // up to a wall, which holds ice that drifts, and the body
+        const bool wall = kind[k] == BT_BOUND_WALL;
+        if (bt_bound_wraps(kind[k]) || (wall && low[k] < first[k] + size)) low[k] = -INFINITY;
+        if (bt_bound_wraps(kind[k]) || (wall && high[k] > first[k] + extent[k] - size)) high[k] = INFINITY;
+    }
+    for (int64_t i = t->n - 1; i >= 0; i--)
+        if (t->x[i] >= low[0] && t->x[i] <= high[0] && t->y[i] >= low[1] && t->y[i] <= high[1])
+            return i + 1 < t->n ? i : t->n;
+    return t->n;
+}
+
+void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int corners = bt_case_waterline(c, v);
+    if (t->n < 2 || corners == 0 || (!(c->ice.concentration > 0) && !bt_case_reads_field(c))) return;
+    const double size = sqrt(4 / BT_PI * bt_shape_moments(corners, v).area);
+    const double period[2] = {c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+                              c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0};
+    const int64_t wake = first_in_wake(t, period, size), last = last_in_ice(c, t, size);
+    if (wake < t->n)
+        bt_errors_add(warnings,
+                      "from %.4g s on the body meets ice that it has opened before, a period of the domain on: take a "
+                      "larger domain, set domain.ends: moving, or end the run before",
+                      t->time[wake]);
+    if (last < t->n)
+        bt_errors_add(warnings,
+                      "the body leaves the ice at %.4g s, and is in open water from then on: take a longer domain, set "
+                      "domain.ends: moving, or end the run before",
+                      t->time[last]);
+}
