@@ -22,11 +22,11 @@ static void on_save(int number) { save_signal = number; }
 
 static const int caught[BT_N_CAUGHT] = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGUSR1};
 
-void bt_halt_catch(void (*stop)(int), void (*save)(int), struct sigaction before[BT_N_CAUGHT])
+void bt_halt_catch(void (*stops)(int), void (*saves)(int), struct sigaction before[BT_N_CAUGHT])
 {
     for (int k = 0; k < BT_N_CAUGHT; k++) {
         // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
-        struct sigaction act = {.sa_handler = caught[k] == SIGUSR1 ? save : stop, .sa_flags = SA_RESTART};
+        struct sigaction act = {.sa_handler = caught[k] == SIGUSR1 ? saves : stops, .sa_flags = SA_RESTART};
         sigemptyset(&act.sa_mask);
         sigaction(caught[k], NULL, &before[k]);
         const bool outlives_session = caught[k] == SIGHUP && before[k].sa_handler == SIG_IGN; // nohup

@@ -51,7 +51,7 @@ void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96
 
 /// Catch the signals that ask for a stop, and the one that asks for a checkpoint (NULL: not that one); before: for
 /// bt_halt_let_go.
-void bt_halt_catch(void (*on_stop)(int), void (*on_save)(int), struct sigaction before[BT_N_CAUGHT]);
+void bt_halt_catch(void (*stops)(int), void (*saves)(int), struct sigaction before[BT_N_CAUGHT]);
 void bt_halt_let_go(const struct sigaction before[BT_N_CAUGHT]);
 
 /// Start threads that leave these signals to the main thread: block them, and set *before for pthread_sigmask.
