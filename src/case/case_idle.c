@@ -182,13 +182,17 @@ void bt_case_warn_idle(const bt_case *c, bt_errors *warnings)
     put(&w);
 }
 
-static void put_default(void *to, const char *key, const idle *r)
+static void mark(void *to, const char *key, const idle *r)
 {
     (void)r;
-    bt_case *c = to;
-    const bt_key *k = row_of(key);
+    ((bool *)to)[row_of(key) - bt_case_keys] = true;
+}
+
+void bt_case_mark_idle(const bt_case *c, bool *idle_key) { look(c, mark, idle_key); }
+
+void bt_case_put_default(bt_case *c, int key)
+{
+    const bt_key *k = &bt_case_keys[key];
     const bt_case d = with_default(c, k);
     memcpy((char *)c + k->offset, (const char *)&d + k->offset, size_of(k));
 }
-
-void bt_case_drop_idle(bt_case *c) { look(c, put_default, c); }

@@ -11,8 +11,11 @@ void bt_case_check_idle(const bt_check *k);
 /// Warn of the others, which a base or a study may have brought along.
 void bt_case_warn_idle(const bt_case *c, bt_errors *warnings);
 
-/// Give them their defaults.
-void bt_case_drop_idle(bt_case *c);
+/// Mark them in idle_key [bt_n_case_keys].
+void bt_case_mark_idle(const bt_case *c, bool *idle_key);
+
+/// Give a key of a number or a choice its default.
+void bt_case_put_default(bt_case *c, int key);
 
 /// Has a key of a number or a choice another value than its default, which others may set?
 bool bt_case_changed(const bt_case *c, const char *key);

@@ -118,13 +118,28 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
 bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
 {
     const size_t before = err->n;
+    bool *was = bt_alloc((size_t)bt_n_case_keys, sizeof *was), *now = bt_alloc((size_t)bt_n_case_keys, 1);
+    bt_case_mark_idle(c, was);
     scale_members(c, bt_case_keys, bt_n_case_keys, c, ratio, err);
     for (bt_idx i = 0; i < c->n_floes; i++) scale_members(c, bt_floe_keys, bt_n_floe_keys, &c->floes[i], ratio, err);
-    if (err->n > before) return BT_ERR_CASE;
+    if (err->n > before) {
+        free(was);
+        free(now);
+        return BT_ERR_CASE;
+    }
     // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
     c->tow.line.type = BT_ROPE_NUMBERS;
     c->tow.line.diameter = 0;
-    bt_case_drop_idle(c); // a default that was scaled would look like a value that somebody gave
+    // A default without effect that was scaled would look like a value that somebody gave.
+    for (bool more = true; more;) { // the default of one may follow from another's
+        more = false;
+        memset(now, 0, (size_t)bt_n_case_keys * sizeof *now);
+        bt_case_mark_idle(c, now);
+        for (int i = 0; i < bt_n_case_keys; i++)
+            if (now[i] && !was[i]) bt_case_put_default(c, i), more = true;
+    }
+    free(was);
+    free(now);
     return bt_case_finish(c, err);
 }
 

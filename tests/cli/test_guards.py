@@ -86,6 +86,7 @@ def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
 LAST = changed(CLOSING,
                domain__ends_closing=0.3,
                domain__sides_closing=0.2,
+               ice__concentration=0.6,
                guard={"overlap": 0, "escape": False},
                run__duration=3,
                output__frame_interval=1,

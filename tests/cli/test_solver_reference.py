@@ -209,6 +209,7 @@ def test_the_problem_does_not_come_from_the_solution(tmp_path):
                    ice__friction=0.2,
                    domain__ends_closing=0.5,
                    domain__sides_closing=0.5,
+                   guard__overlap=0,
                    ice__concentration=0.93,
                    water={"current_x": 1.5})
     one, _ = dump(tmp_path, changed(case, solver__max_sweeps=1), 1, "one")
@@ -228,6 +229,7 @@ def test_momentum_and_the_plain_sweep_agree(tmp_path, ice):
                    ice={**BASE["ice"], **ice, "concentration": 0.93},
                    domain={**BASE["domain"], "length": 6, "width": 5},
                    domain__ends_closing=0.3,
+                   guard__overlap=0,
                    water={"current_x": 1.5},
                    solver={"tolerance": 1e-7, "max_sweeps": 1000000})
     fast, r = dump(tmp_path, case, 1, "fast")

@@ -143,8 +143,9 @@ def test_the_width_of_the_domain_is_reported(tmp_path):
 def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
     below = 0
     for c, widths in ((0.3, None), (0.45, 10), (0.7, 30), (0.75, 30), (0.85, 60)):
-        path = write_case(tmp_path, changed(BERG, ice__concentration=c, run__duration=5, tow__ramp=0,
-                                            tow__mode="speed", output__window_start=1, ice__seed=int(100 * c)))
+        path = write_case(tmp_path, changed(BERG, ice__concentration=c, run__duration=5,
+                                            tow={"mode": "speed", "speed": 0.5, "ramp": 0},
+                                            output__window_start=1, ice__seed=int(100 * c)))
         done = call("check", path, "--json")
         assert done.returncode == DONE, done.stderr
         found = json.loads(done.stdout)
