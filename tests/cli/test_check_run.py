@@ -54,8 +54,8 @@ def test_keys_that_the_ice_leaves_unused(tmp_path):
 
 
 def test_a_file_that_has_every_key_may_have_those_without_effect(tmp_path):
-    """A resolved case as a base, also without its first line, says what is, not what is wanted. In a scaled twin what has
-    no effect and was not given keeps its default."""
+    """A resolved case as a base, also without its first line, says what is, not what is wanted. In a scaled twin what
+    has no effect and was not given keeps its default."""
     case = changed(TOW, ice__size=None, ice__size_law="power", ice__size_min=0.4, ice__size_max=2)
     twin = call("check", write_case(tmp_path, case), "--scale", "30")
     (tmp_path / "twin.yml").write_text(twin.stdout)
