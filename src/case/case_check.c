@@ -387,16 +387,17 @@ static void check_tow(const check *k)
 /// INFINITY: not within the run. towards: cosine of the angle between the course and the way to the wall.
 static double way_to_wall(const bt_case *c, double room, double towards, double closing)
 {
-    double early = 0, late = c->run.duration;
-    const double slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (!(towards > 0) || towards * bt_case_tow_led(c, late) + closing * late <= room + slack) return INFINITY;
+    const double end = c->run.duration, slack = 1e-9 * (c->domain.length + c->domain.width);
+    if (!(towards > 0) || towards * bt_case_tow_led(c, end) + closing * end <= room + slack) return INFINITY;
     if (closing == 0) return bt_max(0, room / towards);
-    for (int k = 0; k < 60; k++) {
-        const double middle = 0.5 * (early + late);
-        if (towards * bt_case_tow_led(c, middle) + closing * middle <= room) early = middle;
+    int64_t early = 0, late = bt_case_steps(c);
+    while (late - early > 1) {
+        const int64_t middle = early + (late - early) / 2;
+        const double time = (double)middle * c->run.dt;
+        if (towards * bt_case_tow_led(c, time) + closing * time <= room) early = middle;
         else late = middle;
     }
-    return bt_case_tow_led(c, early);
+    return bt_case_tow_led(c, (double)early * c->run.dt);
 }
 
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.

@@ -41,7 +41,8 @@ double bt_case_tow_distance(const bt_case *c, double t)
 double bt_case_tow_led(const bt_case *c, double t)
 {
     const bt_speed_law l = speed_law(c);
-    return bt_speed_law_led(&l, (int64_t)ceil(t / c->run.dt * (1 - 1e-12)), c->run.dt);
+    const double steps = ceil(t / c->run.dt * (1 - 1e-12)); // not a number in a case that is refused
+    return bt_speed_law_led(&l, steps > 0 && steps < 1e15 ? (int64_t)steps : 0, c->run.dt);
 }
 
 double bt_case_tow_time(const bt_case *c, double way)

@@ -76,7 +76,7 @@ static void cross_checks_refuse(void **state)
         {"tow.mode=line;tow.waypoints=[[9,0]]", "is not ahead of where the towing end starts, (10"},
         {"tow.waypoints=[[6,0],[6,10]];tow.speed=1", "into a wall after"},
         {"body.shape=square;tow.speed=0.5;domain.ends_closing=0.4;run.duration=80",
-         "the tow is 38.8716 m long and a wall stands after 36.7207 m; shorten the run to 75.69 s"},
+         "the tow is 38.8966 m long and a wall stands after 36.6966 m; shorten the run to 75.6 s"},
         {"tow.waypoints=[[30,0],[31,0]];tow.speed=0.5;domain.ends_closing=0.4;run.duration=80", "into a wall after"},
         {"tow.line_length=7", "tow.line_length=7: has no effect without a line"},
         {"tow.mode=line;tow.branch2.length=7", "tow.branch2.length=7: has no effect on a single line"},

@@ -355,7 +355,7 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
         c.air.wind_x = wind * cos(angle), c.air.wind_y = wind * sin(angle);
         if (scene % 3)
             c.water.current_x = draw(&seed, 0.01, 2), c.water.tide.major = draw(&seed, 0.01, 2),
-            c.water.tide.minor = -0.5 * c.water.tide.major, c.water.tide.period = draw(&seed, 3, 300) * c.run.dt;
+            c.water.tide.minor = -0.5 * c.water.tide.major, c.water.tide.period = draw(&seed, 20, 300) * c.run.dt;
         if (scene % 6 == 1) c.water.tilt = BT_TILT_SLOPE, c.water.slope_x = draw(&seed, 1e-6, 1e-2);
         if (scene % 2) c.water.latitude = 80 * BT_PI / 180;
         if (scene % 6 == 3) c.water.tilt = BT_TILT_DYNAMIC;
