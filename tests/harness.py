@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import shlex
+import signal
 import subprocess
 
 import h5py
@@ -112,6 +113,13 @@ def rank_of(variables):
     """The rank of a process by its environment, None without a launcher."""
     rank = variables.get("OMPI_COMM_WORLD_RANK", variables.get("PMI_RANK"))
     return None if rank is None else int(rank)
+
+
+def heard():
+    """In a child before its program: signals that a suite in the background or under nohup ignores end it as they do
+    in a terminal."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def call(*arguments, cwd=None, env=None, timeout=120, **more):

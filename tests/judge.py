@@ -26,6 +26,7 @@ def may_be_null(path, case, summary):
          not body),
         (r"(mean|peak)_line_tension.*_n", not body or value_of(case, "tow.mode") not in ("line", "thrust")
          or window == 0),
+        (r"mean_ice_resistance(_se|_low|_high)?_n", value_of(case, "tow.mode") == "none"),
         (r"mean_line_tension_2.*_n", value_of(case, "tow.line.branches", 1) != 2),
         (r"mean_vessel_thrust.*_n", not body or value_of(case, "tow.mode") != "thrust" or window == 0),
         (r"window\.series\..*\.change.*", window < 12),

@@ -192,7 +192,6 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
     const double energy = r->guard.energy; // of the start, from a checkpoint
     bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
     if (energy > 0) r->guard.energy = energy;
-    bt_halt_begin(&r->halt);
     r->began = bt_clock();
     if (!fresh) return BT_OK;
     r->frames_due = 1;
@@ -218,9 +217,13 @@ bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c,
     bt_status status = set_up(r, m->kept, err);
     // Only now: a case that is refused leaves nothing behind.
     if (status == BT_OK && o->dir && !m->held) status = take_folder(comm, o->dir, &m->lock, err);
-    if (status == BT_OK && o->dir) status = open_record(r, m->kept, err);
+    if (status != BT_OK) return status;
+    bt_halt_begin(&r->halt); // before the record, which says to whoever looks that the run has begun
+    if (o->dir) status = open_record(r, m->kept, err);
     r->begun = status == BT_OK;
-    return r->begun ? begin_steps(r, !m->kept, err) : status;
+    if (r->begun) return begin_steps(r, !m->kept, err);
+    bt_halt_end(&r->halt);
+    return status;
 }
 
 // --- step ------------------------------------------------------------------------------------------------------------

@@ -58,6 +58,12 @@ def balanced(request, tmp_path_factory):
     return BALANCES[request.param], run(tmp_path_factory.mktemp("balance"), BALANCES[request.param])
 
 
+def resistance_is(case, summary, mean, rel):
+    """The ice resistance is against the tow: without one it is none."""
+    found = summary["mean_ice_resistance_n"]
+    assert found is None if case["tow"]["mode"] == "none" else found == pytest.approx(mean, rel=rel)
+
+
 def test_forces_on_the_body(balanced):
     """tow = ice + drag + Coriolis + tilt + inertia in every sample, and in the means of the summary to 1e-6.
 
@@ -72,7 +78,7 @@ def test_forces_on_the_body(balanced):
     assert np.all(np.abs(tow - sum(others)) <= 1e-9 * scale)
     s = r.summary
     mean = s["mean_tow_force_n"] - sum(s[f"mean_{name}_force_n"] for name in ("drag", "coriolis", "tilt", "inertia"))
-    assert s["mean_ice_resistance_n"] == pytest.approx(mean, rel=1e-6)
+    resistance_is(case, s, mean, 1e-6)
     assert s["budget"]["tow_minus_other_forces_n"] == pytest.approx(mean, rel=1e-9)
     assert not warned(r, "balance")
 
@@ -227,23 +233,24 @@ def test_tension_is_the_spring_and_pulls_only(balanced):
 
 
 def test_resistance_by_the_momentum_of_everything_else(balanced):
-    _, r = balanced
+    case, r = balanced
     ice, budget = r.series("ice_resistance", "ice_resistance_budget")
     assert np.abs(ice - budget).max() <= 1e-9 * np.abs(ice).max()
-    assert r.summary["mean_ice_resistance_n"] == pytest.approx(r.summary["mean_ice_resistance_budget_n"], rel=1e-6)
+    resistance_is(case, r.summary, r.summary["mean_ice_resistance_budget_n"], 1e-6)
 
 
 def test_means_are_those_of_the_series(balanced):
-    _, r = balanced
+    case, r = balanced
     time, ice, tow = r.series("time", "ice_resistance", "tow_force")
     w = r.summary["window"]
     inside = (time >= w["start_s"] - 1e-9) & (time <= w["end_s"] + 1e-9)
     assert inside.sum() == w["n_samples"] > 100
-    assert r.summary["mean_ice_resistance_n"] == pytest.approx(ice[inside].mean(), rel=1e-12)
+    resistance_is(case, r.summary, ice[inside].mean(), 1e-12)
     assert r.summary["mean_tow_force_n"] == pytest.approx(tow[inside].mean(), rel=1e-12)
     assert r.summary["peak_ice_resistance_n"] == ice[inside].max()
     # Correlated samples: never more certain than independent ones, and not off by more than the window allows.
-    assert r.summary["mean_ice_resistance_se_n"] > 0.7 * ice[inside].std() / np.sqrt(inside.sum())
+    se = r.summary["mean_ice_resistance_se_n"]
+    assert se is None or se > 0.7 * ice[inside].std() / np.sqrt(inside.sum())
 
 
 def test_momentum_every_step(balanced):

@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-from harness import BERGTOW, ROOT, TOW, call, changed, differing, environment, write_case
+from harness import BERGTOW, ROOT, TOW, call, changed, differing, environment, heard, write_case
 
 sys.path.insert(0, str(ROOT / "postproc"))
 import bergtow  # noqa: E402
@@ -99,7 +99,7 @@ if __name__ == "__main__":
 """
     p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                          env=environment(BERGTOW=str(BERGTOW)),
-                         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+                         preexec_fn=heard)
     until(lambda: len(list(out.glob("members/*/result.part.h5"))) == 2)
     p.send_signal(signal.SIGINT)
     _, err = p.communicate(timeout=60)

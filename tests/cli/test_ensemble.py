@@ -12,7 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, launcher, write_case
+from harness import (BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, heard, launcher,
+                     write_case)
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
@@ -137,7 +138,8 @@ def test_interrupted(quiet, tmp_path, number):
                              env=environment(OMP_NUM_THREADS=1),
                              stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE,
-                             text=True)
+                             text=True,
+                             preexec_fn=heard)
     while not list(tmp_path.glob("all/members/*/result*.h5")):
         time.sleep(0.01)
     child.send_signal(number)

@@ -14,7 +14,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, IO, ROOT, call, changed, differing, run, write_case
+from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -223,7 +223,7 @@ def test_ctrl_c_stops_an_ensemble_that_goes_on(tmp_path):
     script = (f"import sys; sys.path.insert(0, {str(ROOT / 'postproc')!r}); import bergtow; "
               f"bergtow.Ensemble.run({str(path)!r}, {str(tmp_path / 'out')!r})")
     p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # a shell's & ignores it
+                         preexec_fn=heard)
     end = time.monotonic() + 60
     while not list(tmp_path.glob("out/members/*/result.part.h5")) and time.monotonic() < end:
         time.sleep(0.02)

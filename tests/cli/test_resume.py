@@ -13,7 +13,7 @@ import h5py
 import pytest
 
 from harness import (BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed, environment,
-                     run, write_case)
+                     heard, run, write_case)
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -35,7 +35,7 @@ def begun(folder, name, *arguments, **more):
                          stdout=subprocess.PIPE,
                          stderr=subprocess.PIPE,
                          text=True,
-                         **more)
+                         **{"preexec_fn": heard, **more})
     end = time.time() + 30
     while not (folder / name / "result.part.h5").exists() and time.time() < end:
         time.sleep(0.005)
