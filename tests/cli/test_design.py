@@ -117,7 +117,7 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
     assert ("domain is narrow for this ice" in page) == (not wider)
     if wider:  # what it holds for is said of each condition, and the keys show both
         assert "domain 5 m wide (concentration 20 %), domain 20.1 m wide (concentration 45 %), time step" in page
-        assert "5 m; 20.1 m at ice.concentration=0.45" in page
+        assert "5 m (concentration 20 %); 20.1 m (concentration 45 %)" in page
 
 
 def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
