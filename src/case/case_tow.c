@@ -56,7 +56,7 @@ double bt_case_tow_last(const bt_case *c, double way)
     const bt_speed_law l = speed_law(c);
     int64_t low = 0, high = bt_case_steps(c);
     while (low < high) {
-        const int64_t mid = low + (high - low + 1) / 2;
+        const int64_t mid = low + (high - low) / 2 + 1;
         if (bt_speed_law_led(&l, mid, c->run.dt) <= way) low = mid;
         else high = mid - 1;
     }
