@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Names of what a program adds: laws, shapes, quantities.
+// Names: of what a program adds (laws, shapes, quantities), and lists of names.
 #ifndef BERGTOW_NAME_H
 #define BERGTOW_NAME_H
 
 #include <stdbool.h>
 
+enum { BT_LONGEST_KEY = 64 };   ///< bytes of a name of a key with its end
 enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append a word to it, and 48 fit
 
 /// Lower-case letters, digits and _, beginning with no digit, at most `most` of them.
 bool bt_is_name(const char *s, int most);
+
+/// The next of names with blanks between them, such as those of keys, cut to its room; false after the last.
+bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);
 
 #endif

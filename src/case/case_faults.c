@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/name.h"
 #include "case/schema.h"
 
 void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256])
@@ -45,13 +46,9 @@ bool bt_check_together(const bt_check *k, const char *key, const char *other)
 
 bool bt_check_sound(const bt_check *k, const char *keys)
 {
-    while (k->from && *keys) {
-        char name[64];
-        size_t n = strcspn(keys, " ");
-        snprintf(name, sizeof name, "%.*s", (int)n, keys);
+    char name[BT_LONGEST_KEY];
+    while (k->from && bt_next_name(&keys, name))
         if (origin(k, name)->faulty) return false;
-        keys += n + strspn(keys + n, " ");
-    }
     return true;
 }
 

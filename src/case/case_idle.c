@@ -10,10 +10,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/name.h"
 #include "case/case_check.h"
 #include "case/schema.h"
 
-enum { LONGEST_NAME = 64 };
 
 /// Keys that are not used.
 typedef struct idle {
@@ -113,15 +113,11 @@ bool bt_case_changed(const bt_case *c, const char *key)
 static void look(const bt_case *c, void (*found)(void *to, const char *key, const idle *r), void *to)
 {
     idle rules[RULES];
+    char name[BT_LONGEST_KEY];
     list(c, rules);
     for (int i = 0; i < RULES; i++)
-        for (const char *keys = rules[i].keys; rules[i].so && *keys; keys += strspn(keys, " ")) {
-            char name[LONGEST_NAME];
-            const size_t n = strcspn(keys, " ");
-            snprintf(name, sizeof name, "%.*s", (int)n, keys);
-            keys += n;
+        for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
             if (bt_case_changed(c, name)) found(to, name, &rules[i]);
-        }
 }
 
 /// Does the file in which the key stands have more than half of all keys? Nobody writes so many by hand.
@@ -137,15 +133,13 @@ static void refuse(void *to, const char *key, const idle *r)
 {
     const bt_check *k = to;
     if (says_all(k, key) || !bt_check_sound(k, key) || !bt_check_sound(k, r->cause)) return;
-    for (const char *causes = r->cause; *causes; causes += strspn(causes, " ")) {
-        char cause[LONGEST_NAME];
-        const size_t n = strcspn(causes, " ");
-        snprintf(cause, sizeof cause, "%.*s", (int)n, causes);
-        causes += n;
+    const char *causes = r->cause;
+    char cause[BT_LONGEST_KEY];
+    while (bt_next_name(&causes, cause))
         if (!bt_check_together(k, key, cause)) return;
-    }
-    bt_check_fault(k, key, "has no effect %s; remove the key, or change %.*s", r->why,
-                   (int)strcspn(r->cause, " "), r->cause);
+    causes = r->cause;
+    bt_next_name(&causes, cause); // the first is the one to change
+    bt_check_fault(k, key, "has no effect %s; remove the key, or change %s", r->why, cause);
 }
 
 void bt_case_check_idle(const bt_check *k)

@@ -9,11 +9,11 @@
 // ice at rest that a body is towed through. So the window is one of the ice: in the frame that drifts with it,
 // with s = σ (x − drift), σ = ±1 the sign of the tow along x, it covers [rear, rear + L), and `rear` follows the body,
 // which so keeps its distance `ahead` from the front. A floe is due when the rear has passed its home, s(X_i) < rear,
-// and itself, s(x_i) < rear; one that the body has pushed
-// ahead is taken from inside by as much as it is late, rear − s(X_i), but not from the half next to the body of what
-// lies behind it. It is renewed when its next place, X_i + σL at the front, is free of all floes that stay: it is put
-// there with the velocity of undisturbed ice. Floes whose places hold each other go at once. So the number of bodies,
-// their ids and the memory stay, and what enters is the mother field as it was made.
+// and itself, s(x_i) < rear; one that the body has pushed ahead is taken from inside by as much as it is late,
+// rear − s(X_i), but not from the half next to the body of what lies behind it. It is renewed when its next place,
+// X_i + σL at the front, is free of all floes that stay: it is put there with the velocity of undisturbed ice. Floes
+// whose places hold each other go at once. So the number of bodies, their ids and the memory stay, and what enters is
+// the mother field as it was made.
 //
 // Around the period the rear and the front are neighbours. A floe that waits for its place lies, by the period, among
 // the ice at the front, acts there as any other, and keeps that ice complete. Within the front zone, half of `ahead`

@@ -490,21 +490,29 @@ static void the_end_follows_the_path_exactly(void **state)
         }
 }
 
-/// A vessel with a current abeam keeps its track: no cross-track error is left but what the current's drag makes.
-static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
+/// A vessel 10 m ahead of its body, ordered 1 m/s, and what it needs to keep a track.
+static bt_world *piloted_world(void)
 {
-    (void)state;
     bt_world *w = tow_world(1, 50, (bt_drag){.water_skin = 30, .yaw = 30});
     bt_tow *t = w->tow;
-    char why[200];
     t->mode = BT_TOW_THRUST;
     t->n_branches = 1;
     t->branch[0] = (bt_branch){.length0 = 10, .k = 100, .c = 100};
     t->carriage_x = 10;
+    t->speed = 1;
     t->vessel = (bt_vessel){
         .mass = 500, .bollard_pull = 300, .free_speed = 6, .free_resistance = 100, .lateral = 20, .lookahead = 20};
+    return w;
+}
+
+/// A vessel with a current abeam keeps its track: no cross-track error is left but what the current's drag makes.
+static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
+{
+    (void)state;
+    bt_world *w = piloted_world();
+    bt_tow *t = w->tow;
+    char why[200];
     assert_true(bt_path_make(&t->path, 10, 0, 2, (double[]){300, 0, 300, 1000}, 0, why));
-    t->speed = 1;
     double across = 0, after = 0;
     for (int s = 0; s < 1000; s++) {
         bt_world_step(w);
@@ -528,18 +536,11 @@ static void a_vessel_turns_back(void **state)
     const struct { double degrees, radius;
     } corner[] = {{97, 0}, {120, 0}, {120, 5}, {150, 2}, {179, 0}};
     for (size_t k = 0; k < sizeof corner / sizeof *corner; k++) {
-        bt_world *w = tow_world(1, 50, (bt_drag){.water_skin = 30, .yaw = 30});
+        bt_world *w = piloted_world();
         bt_tow *t = w->tow;
         char why[200];
-        t->mode = BT_TOW_THRUST;
-        t->n_branches = 1;
-        t->branch[0] = (bt_branch){.length0 = 10, .k = 100, .c = 100};
-        t->carriage_x = 10;
-        t->vessel = (bt_vessel){
-            .mass = 500, .bollard_pull = 300, .free_speed = 6, .free_resistance = 100, .lateral = 20, .lookahead = 20};
         const double a = corner[k].degrees * BT_PI / 180, x = 60 + 200 * cos(a), y = 200 * sin(a);
         assert_true(bt_path_make(&t->path, 10, 0, 2, (double[]){60, 0, x, y}, corner[k].radius, why));
-        t->speed = 1;
         for (int s = 0; s < 400; s++) bt_world_step(w);
         assert_int_equal(t->mark, 2);
         // on the leg after, on its line
