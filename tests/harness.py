@@ -96,12 +96,14 @@ def environment(**extra):
     """The caller's, without what would tell the program how many threads or ranks to use.
 
     Threads wait passively: on a machine that is busy with something else, threads that spin at a barrier take the very
-    core that the thread they wait for would need (20 times slower, seen with two threads on two cores).
+    core that the thread they wait for would need (20 times slower, seen with two threads on two cores). With its
+    settings given the program needs no second start (main.c).
     """
     theirs = "OMPI_", "PMIX_", "PMI_", "SLURM_", "BERGTOW_MPI", "OMP_"
     kept = {k: v for k, v in os.environ.items() if not k.startswith(theirs)}
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # as which containers run tests
-    return kept | {"OMP_WAIT_POLICY": "passive"} | root | {k: str(v) for k, v in extra.items()}
+    settings = {"OMP_WAIT_POLICY": "passive", "BERGTOW_STARTED": "1"}
+    return kept | settings | root | {k: str(v) for k, v in extra.items()}
 
 
 def launcher(ranks, *options):

@@ -21,26 +21,35 @@ static const struct {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
     bool parallel; ///< all ranks take part; otherwise rank 0 alone
+    bool steps;    ///< it makes time steps, so that start_with_settings() serves it
 } commands[] = {
-    {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
-    {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false},
-    {"field", "make the ice field of a case only", bt_cmd_field, false},
+    {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true, true},
+    {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false, false},
+    {"field", "make the ice field of a case only", bt_cmd_field, false, true},
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
-     true},
+     true, true},
     {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
-     bt_cmd_script, false},
+     bt_cmd_script, false, false},
     {"budget", "find out how much of the scatter is of the fields, of each assumed value, of the computation",
-     bt_cmd_script, false},
-    {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false},
+     bt_cmd_script, false, false},
+    {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false, false},
     {"design", "from a case or a study to the report of the design tow force, as a page and as PDF", bt_cmd_script,
      false},
     {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines", bt_cmd_script,
      false},
-    {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
-    {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
-    {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
+    {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true, true},
+    {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false, false},
+    {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false, false},
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
+
+/// The command of that name, −1 = none.
+static int command_of(const char *word)
+{
+    for (int i = 0; i < N_COMMANDS; i++)
+        if (!strcmp(word, commands[i].name)) return i;
+    return -1;
+}
 
 static void print_version(FILE *out, struct argp_state *state)
 {
@@ -96,9 +105,12 @@ __attribute__((section(".preinit_array"), used)) static void (*const before_all)
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
 // microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where
 // the system gives them, and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C
-// library read their settings before main, hence the second start; the user's own win.
-static void start_with_settings(char **argv)
+// library read their settings before main, hence the second start; the user's own win. Loading the libraries again takes
+// 50 ms, which commands without a time step are spared.
+static void start_with_settings(int argc, char **argv)
 {
+    const int command = argc > 1 ? command_of(argv[1]) : -1;
+    if (command < 0 || !commands[command].steps) return;
     if (getenv("BERGTOW_STARTED")) {
         prctl(PR_SET_NAME, "bergtow"); // else ps, top and killall know it as exe
         return;
@@ -143,9 +155,8 @@ static int bergtow(int argc, char **argv)
         return BT_ERR_USAGE;
     }
     const char *word = argv[1];
-    for (int i = 0; i < N_COMMANDS; i++)
-        if (!strcmp(word, commands[i].name))
-            return first || commands[i].parallel ? start(i, argc - 1, argv + 1) : BT_OK;
+    const int command = command_of(word);
+    if (command >= 0) return first || commands[command].parallel ? start(command, argc - 1, argv + 1) : BT_OK;
     if (!first) return BT_OK; // what follows concerns the console
 
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"),
@@ -170,7 +181,7 @@ static int bergtow(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    start_with_settings(argv);
+    start_with_settings(argc, argv);
     if (bt_comm_start(&argc, &argv) != BT_OK) return BT_ERR_USAGE;
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;
