@@ -37,8 +37,10 @@ HDF5_HL     := $(filter -L%,$(HDF5_LIBS)) -lhdf5_hl
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
 # same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
 # for AVX2.
+# -fPIC: the program and the shared library are made of the same objects; without interposition it costs no instruction.
 # -Wno-psabi: how vectors of four are passed to functions does not matter, as all of those are inlined.
 BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -MMD -MP -ffp-contract=off -fno-math-errno \
+          -fPIC -fno-semantic-interposition \
           -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
@@ -122,24 +124,17 @@ $(BUILD)/libbergtow.a: $(LIB_OBJ)
 
 # --- The shared library, and what is installed with it -------------------------------------------------------------
 
-# The program keeps objects of its own, without -fPIC. The number of the soname rises when a public header changes so
-# that programs built before no longer work.
+# The number of the soname rises when a public header changes so that programs built before no longer work.
 VERSION := $(shell sed -n 's/^\#define BT_VERSION "\(.*\)"/\1/p' include/bergtow/base.h)
 SONAME := libbergtow.so.$(firstword $(subst ., ,$(VERSION)))
-PIC_OBJ := $(LIB_SRC:%.c=$(BUILD)/pic/%.o)
-
-$(BUILD)/pic/%.o: %.c $(STAMP) | $(REV)
-	@mkdir -p $(@D)
-	@echo '  PIC  $<'
-	@$(CC) $(CFLAGS) -fPIC -fno-semantic-interposition -I$(BUILD) -c $< -o $@
 
 $(BUILD)/symbols.map: $(BUILD)/libbergtow.a install/symbols.sh $(wildcard include/bergtow/*.h)
 	@install/symbols.sh $< > $@.new && mv $@.new $@
 
-$(BUILD)/libbergtow.so.$(VERSION): $(PIC_OBJ) $(BUILD)/symbols.map
+$(BUILD)/libbergtow.so.$(VERSION): $(LIB_OBJ) $(BUILD)/symbols.map
 	@echo '  LINK $@'
 	@$(CC) $(CFLAGS) -shared -Wl,-soname,$(SONAME) -Wl,--version-script,$(BUILD)/symbols.map -Wl,-z,defs \
-	  $(PIC_OBJ) $(LDLIBS) -o $@
+	  $(LIB_OBJ) $(LDLIBS) -o $@
 
 $(BUILD)/libbergtow.so: $(BUILD)/libbergtow.so.$(VERSION)
 	@ln -sf $(<F) $(BUILD)/$(SONAME)
@@ -186,7 +181,7 @@ FAULT := $(patsubst %.c,$(BUILD)/%.so,$(wildcard tests/fault/*.c))
 $(FAULT): $(BUILD)/%.so: %.c $(STAMP)
 	@mkdir -p $(@D)
 	@echo '  TEST $@'
-	@$(CC) $(CFLAGS) -shared -fPIC $< -ldl -o $@
+	@$(CC) $(CFLAGS) -shared $< -ldl -o $@
 
 tests: $(TEST_BIN) $(RANK_BIN) $(EXTENDED) $(FAULT) $(BUILD)/triad ## build the test programs
 
@@ -374,5 +369,5 @@ uninstall: ## take away what make install has put into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(patsubst %.o,%.d,$(LIB_OBJ) $(PIC_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
+-include $(patsubst %.o,%.d,$(LIB_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
 -include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d $(FAULT:.so=.d)
