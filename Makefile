@@ -290,6 +290,7 @@ test-long: deps-long ## tests that take minutes: intervals over fields, long tow
 	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=asan all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
+	BERGTOW=build/release/bergtow $(PYTEST) -m slow tests/parallel tests/cli
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help
 mutate: deps-test ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended

@@ -9,6 +9,7 @@ import pytest
 
 
 def pytest_configure(config):
+    config.addinivalue_line("markers", "slow: not in make test, but in make test-long")
     if not os.access(harness.BERGTOW, os.X_OK):
         raise pytest.UsageError(f"{harness.BERGTOW}: no such program; build it with make, or name it in BERGTOW")
 

@@ -12,6 +12,7 @@ import subprocess
 
 import h5py
 import numpy as np
+import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergtow"))
@@ -73,6 +74,14 @@ def changed(base, /, **changes):
         else:
             section[key] = value
     return case
+
+
+def quick(parameters, *kept):
+    """Parameters of a test, of which make test takes those that are kept; make test-long takes all."""
+    parameters = list(parameters)
+    assert set(kept) <= set(parameters), kept
+    slow = [pytest.param(*(p if isinstance(p, tuple) else (p, )), marks=pytest.mark.slow) for p in parameters]
+    return [p if p in kept else s for p, s in zip(parameters, slow)]
 
 
 MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",

@@ -244,6 +244,7 @@ def brute(folder, value, n):
     return np.array(speeds)
 
 
+@pytest.mark.slow
 def test_the_limit_of_concentration_against_brute_force(tmp_path):
     found, text = found_in(tmp_path, THRUST, "--from", 0.3, "--to", 0.9, "--speed", 0.1, "--points", 2, "--budget", 3,
                            "--resolution", 0.15)

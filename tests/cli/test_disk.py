@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, launcher, write_case
+from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, launcher, quick, write_case
 
 WITHIN = 0.2
 SHORT = changed(TOW, run__duration=10)
@@ -49,8 +49,8 @@ def run(folder, path, ranks, *more):
     return left(folder)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name, ranks", quick([(name, ranks) for name in CASES for ranks in (1, 2)],
+                                              *((name, 1) for name in CASES), ("dense", 2), ("two checkpoints", 2)))
 def test_what_is_left(tmp_path, name, ranks):
     path = write_case(tmp_path, CASES[name])
     text = call("check", path).stdout

@@ -419,7 +419,7 @@ static void rows_and_contacts_are_one_system(void **state)
         t->vessel = (bt_vessel){
             .mass = 200, .bollard_pull = 400, .free_speed = 5, .free_resistance = 100, .lateral = 10, .lookahead = 50};
         straight_path(t, 20.2, 0, 1, 0);
-        for (int s = 0; s < 400; s++) {
+        for (int s = 0; s < 200; s++) {
             bt_world_step(w);
             assert_true(w->stats.converged);
             assert_true(w->stats.momentum_residual < 1e-9 && vessel_closure(t) < 1e-12);

@@ -498,7 +498,7 @@ static void no_floes_need_no_rows(void **state)
 {
     (void)state;
     bt_params p = cell_params();
-    p.size = 1e-9, p.dt = 1e-8, p.slop = 1e-12;
+    p.size = 1e-8, p.dt = 1e-7, p.slop = 1e-11;
     p.period_y = 300;
     bt_world *w = bt_world_create(&p);
     add_hitter(w, 20, 10, 100, 0.1, 0, BT_DYNAMIC, true);
