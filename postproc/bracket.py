@@ -18,7 +18,7 @@ next; one that stays undecided has p near q, and the gaps to both sides of it ar
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
+import scipy
 
 LEVEL = 0.025
 SURE = 0.3    # weight of p = 1
@@ -28,13 +28,13 @@ YES, NO, OPEN = "yes", "no", "open"
 def log_evidence(good, bad, share):
     """Logarithm of the bet that p > share, after so many good and bad trials."""
     # the mixture of density (1 - p)^-1/2 over (share, 1]: the integral of p^good (1 - p)^(bad - 1/2), over its weight
-    inside = special.betainc(bad + 0.5, good + 1, 1 - share)
-    mixed = -np.inf if inside <= 0 else np.log(inside) + special.betaln(good + 1, bad + 0.5) - np.log(
+    inside = scipy.special.betainc(bad + 0.5, good + 1, 1 - share)
+    mixed = -np.inf if inside <= 0 else np.log(inside) + scipy.special.betaln(good + 1, bad + 0.5) - np.log(
         2 * np.sqrt(1 - share))
     bets = [np.log(1 - SURE) + mixed - good * np.log(share) - bad * np.log1p(-share)]
     if not bad:
         bets.append(np.log(SURE) - good * np.log(share))
-    return float(special.logsumexp(bets))
+    return float(scipy.special.logsumexp(bets))
 
 
 def verdict(good, bad, share=0.5, level=LEVEL):

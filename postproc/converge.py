@@ -33,7 +33,7 @@ from bergtow_read import Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, program, whole_from
 
 import numpy as np
-from scipy import stats
+import scipy
 
 FIELDS = (4, 8, 16, 32, 64, 128, 256)  # of each look
 LOOKS = len(FIELDS)
@@ -127,7 +127,7 @@ def effect(base, other, looks=LOOKS):
     logs = value > 0 and np.all(without > 0)
     there, back = (np.log, np.exp) if logs else (np.asarray, np.asarray)
     se = np.sqrt((n - 1) / n * np.sum((there(without) - there(without).mean()) ** 2))
-    half = stats.t.ppf(1 - 0.025 / looks, n - 1) * se
+    half = scipy.stats.t.ppf(1 - 0.025 / looks, n - 1) * se
     return float(value) - 1, (float(back(there(value) - half)) - 1, float(back(there(value) + half)) - 1)
 
 

@@ -27,6 +27,7 @@ from ensemble_read import DOUBTS, Ensemble, reading, short_key, worded
 
 import matplotlib.pyplot as plt
 import numpy as np
+import scipy
 from matplotlib.colors import LogNorm
 
 MOST_PANELS = 6
@@ -184,7 +185,7 @@ def power_law(x, means):
     c, *_ = np.linalg.lstsq(a, np.log(y), rcond=None)
     rest = np.log(y) - a @ c
     se = np.sqrt(np.dot(rest, rest) / (len(y) - 2) * np.linalg.inv(a.T @ a)[1, 1])
-    half = stat_mean.stats.t.ppf(0.975, len(y) - 2) * se
+    half = scipy.stats.t.ppf(0.975, len(y) - 2) * se
     return c[1], c[1] - half, c[1] + half, np.exp(c[0])
 
 

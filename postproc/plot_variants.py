@@ -7,7 +7,7 @@
                       Welch's t. Below: the means themselves
 """
 import numpy as np
-from scipy import stats
+import scipy
 
 import stat_mean
 import style
@@ -35,7 +35,7 @@ def relative_change(means, base, paired):
     ratio = of.mean() / to.mean()
     a, b = of.var(ddof=1) / len(of) / to.mean()**2, ratio**2 * to.var(ddof=1) / len(to) / to.mean()**2
     freedom = (a + b)**2 / (a**2 / (len(of) - 1) + b**2 / (len(to) - 1)) if a + b > 0 else 1
-    return 100 * (ratio - 1), 100 * stats.t.ppf(0.5 + stat_mean.LEVEL / 2, freedom) * np.sqrt(a + b)
+    return 100 * (ratio - 1), 100 * scipy.stats.t.ppf(0.5 + stat_mean.LEVEL / 2, freedom) * np.sqrt(a + b)
 
 
 def panels(e):

@@ -16,7 +16,7 @@ the counts of clusters against a Poisson distribution, which have too few cluste
 samples they found 3 %.
 """
 import numpy as np
-from scipy import stats
+import scipy
 
 import stat_extreme
 
@@ -35,12 +35,12 @@ def p_value(fields, block):
     maxima = np.array([_maxima(f, hours, k) for f in fields])
     if not np.isfinite(maxima).all():
         return np.nan
-    ranks = stats.rankdata(maxima).reshape(maxima.shape)
+    ranks = scipy.stats.rankdata(maxima).reshape(maxima.shape)
     within = np.mean(np.var(ranks, axis=1, ddof=1))
     between = k * np.var(ranks.mean(axis=1), ddof=1)
     if within == 0:
         return 0.0 if between > 0 else 1.0
-    return float(stats.f.sf(between / within, len(fields) - 1, len(fields) * (k - 1)))
+    return float(scipy.stats.f.sf(between / within, len(fields) - 1, len(fields) * (k - 1)))
 
 
 def _maxima(field, hours, blocks):

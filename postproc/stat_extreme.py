@@ -26,7 +26,7 @@ is refused in words. Values that differ by rounding alone are the same (TIE): in
 differ by some 1e-14 of it, and a tail would be fitted to that.
 """
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 import stat_fit
 import stat_profile
@@ -92,7 +92,7 @@ def gpd(excess):
     values = minus_likelihood(t)
     k = int(np.argmin(values))
     ends = t[max(k - 1, 0)], t[min(k + 1, len(t) - 1)]
-    best = optimize.minimize_scalar(minus_likelihood, bounds=ends, method="bounded", options={"xatol": 1e-9}).x
+    best = scipy.optimize.minimize_scalar(minus_likelihood, bounds=ends, method="bounded", options={"xatol": 1e-9}).x
     if minus_likelihood(best) > values[k]:
         best = t[k]
     shape = float(shape_of(best))
@@ -174,8 +174,8 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
                                         hours_of_levels)
     def refit(y):
         s, k = gpd(y)
-        return stat_fit.Frozen(stats.genpareto, k, scale=s)
-    frozen = stat_fit.Frozen(stats.genpareto, shape, scale=scale)
+        return stat_fit.Frozen(scipy.stats.genpareto, k, scale=s)
+    frozen = stat_fit.Frozen(scipy.stats.genpareto, shape, scale=scale)
     statistic = stat_fit.anderson_darling(excess, frozen.cdf)
     return {
         "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,

@@ -10,7 +10,7 @@ each other; neither says that the best of them is good.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special, stats
+import scipy
 
 LEAST = 8            # values below which a fit says nothing
 RESAMPLES = 199
@@ -53,13 +53,13 @@ class Frozen:
 
 def _normal(x):
     sd = np.std(x)
-    return {"mean": np.mean(x), "sd": sd}, Frozen(stats.norm, np.mean(x), sd)
+    return {"mean": np.mean(x), "sd": sd}, Frozen(scipy.stats.norm, np.mean(x), sd)
 
 
 def _lognormal(x):
     logs = np.log(x)
-    return {"median": np.exp(logs.mean()), "sd_log": logs.std()}, Frozen(stats.lognorm, logs.std(),
-                                                                                      scale=np.exp(logs.mean()))
+    return {"median": np.exp(logs.mean()), "sd_log": logs.std()}, Frozen(scipy.stats.lognorm, logs.std(),
+                                                                                            scale=np.exp(logs.mean()))
 
 
 def _weibull(x):
@@ -75,17 +75,17 @@ def _weibull(x):
     low = high / 2
     while equation(low) > 0:
         low /= 2
-    c = optimize.brentq(equation, low, high, rtol=1e-10)
+    c = scipy.optimize.brentq(equation, low, high, rtol=1e-10)
     scale = np.exp(top + np.log(np.mean(np.exp(c * (logs - top)))) / c)
-    return {"shape": c, "scale": scale}, Frozen(stats.weibull_min, c, scale=scale)
+    return {"shape": c, "scale": scale}, Frozen(scipy.stats.weibull_min, c, scale=scale)
 
 
 def _gamma(x):
     """Shape a from ln a - digamma(a) = ln mean x - mean ln x."""
     s = np.log(np.mean(x)) - np.mean(np.log(x))
     start = (3 - s + np.sqrt((s - 3) ** 2 + 24 * s)) / (12 * s)
-    a = optimize.brentq(lambda a: np.log(a) - special.digamma(a) - s, start / 3, 3 * start, rtol=1e-10)
-    return {"shape": a, "scale": np.mean(x) / a}, Frozen(stats.gamma, a, scale=np.mean(x) / a)
+    a = scipy.optimize.brentq(lambda a: np.log(a) - scipy.special.digamma(a) - s, start / 3, 3 * start, rtol=1e-10)
+    return {"shape": a, "scale": np.mean(x) / a}, Frozen(scipy.stats.gamma, a, scale=np.mean(x) / a)
 
 
 def gev_moments(x):
@@ -97,8 +97,8 @@ def gev_moments(x):
     c = (2 * b1 - b0) / (3 * b2 - b0) - np.log(2) / np.log(3)
     k = np.clip(7.8590 * c + 2.9554 * c * c, -0.6, 0.9)  # k = -shape
     k = k if abs(k) > 1e-6 else 1e-6
-    scale = (2 * b1 - b0) * k / (special.gamma(1 + k) * (1 - 2 ** -k))
-    return b0 + scale * (special.gamma(1 + k) - 1) / k, scale, -k
+    scale = (2 * b1 - b0) * k / (scipy.special.gamma(1 + k) * (1 - 2 ** -k))
+    return b0 + scale * (scipy.special.gamma(1 + k) - 1) / k, scale, -k
 
 
 def gev_minus_log_likelihood(theta, x):
@@ -123,19 +123,19 @@ def gev(x):
     start = np.array([location, np.log(scale), shape])
     if not np.isfinite(gev_minus_log_likelihood(start, y)):  # a value lies beyond the end of the first guess
         start = np.array([-0.45, np.log(0.78), 1e-3])        # Gumbel of mean 0 and standard deviation 1
-    found = optimize.minimize(gev_minus_log_likelihood,
-                              start,
-                              args=(y, ),
-                              method="Nelder-Mead",
-                              options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 2000})
+    found = scipy.optimize.minimize(gev_minus_log_likelihood,
+                                    start,
+                                    args=(y, ),
+                                    method="Nelder-Mead",
+                                    options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 2000})
     location, log_scale, shape = found.x
     return centre + width * location, width * np.exp(log_scale), shape
 
 
 def _gev(x):
     location, scale, shape = gev(x)
-    return {"location": location, "scale": scale, "shape": shape}, Frozen(stats.genextreme, -shape, loc=location,
-                                                                               scale=scale)
+    return {"location": location, "scale": scale, "shape": shape}, Frozen(scipy.stats.genextreme, -shape, loc=location,
+                                                                                     scale=scale)
 
 
 #: name: (fit, parameters, only of positive values)
@@ -186,7 +186,7 @@ def fit(name, x, resamples=RESAMPLES):
     aicc = aic + 2 * k * (k + 1) / (n - k - 1)
     return Fit(name, {key: float(v)
                       for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic),
-               float(stats.kstest(x, frozen.cdf).statistic), p, frozen)
+               float(scipy.stats.kstest(x, frozen.cdf).statistic), p, frozen)
 
 
 def fit_all(x, resamples=RESAMPLES):

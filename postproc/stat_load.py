@@ -20,7 +20,7 @@ Extremes: stat_extreme.py, of all samples, where clusters are told apart by two 
 signal, S at least.
 """
 import numpy as np
-from scipy import stats
+import scipy
 
 import stat_extreme
 import stat_mean
@@ -100,7 +100,7 @@ def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
         if not np.isfinite(there(np.array([value, *without]))).all():
             there, back = PLAIN
     x = there(without)
-    half = stats.t.ppf(0.5 + stat_mean.LEVEL / 2, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
+    half = scipy.stats.t.ppf(0.5 + stat_mean.LEVEL / 2, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
     return tuple(float(np.clip(back(there(value) + k * half), low, high)) for k in (-1, 1))
 
 

@@ -13,7 +13,7 @@ bootstrap are too short for few fields.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 BATCHES = 96         # as in src/base/stats.c, and the next three
 WAVES = (2, 3)
@@ -40,7 +40,7 @@ class SeriesMean:
 
     def interval(self, level=LEVEL):
         """(low, high) with the t quantile of dof."""
-        half = stats.t.ppf(0.5 + level / 2, self.dof) * self.se if self.se > 0 else self.se
+        half = scipy.stats.t.ppf(0.5 + level / 2, self.dof) * self.se if self.se > 0 else self.se
         return self.mean - half, self.mean + half
 
 
@@ -87,7 +87,7 @@ def t_interval(x, level=LEVEL):
     n = len(x)
     if n < 2:
         return np.nan, np.nan
-    half = stats.t.ppf(0.5 + level / 2, n - 1) * np.std(x, ddof=1) / np.sqrt(n)
+    half = scipy.stats.t.ppf(0.5 + level / 2, n - 1) * np.std(x, ddof=1) / np.sqrt(n)
     return np.mean(x) - half, np.mean(x) + half
 
 
@@ -115,8 +115,8 @@ def median_interval(x, level=LEVEL):
     small for the level."""
     x = np.sort(x)
     n = len(x)
-    k = int(stats.binom.ppf((1 - level) / 2, n, 0.5))
-    while k > 0 and stats.binom.cdf(k - 1, n, 0.5) > (1 - level) / 2:
+    k = int(scipy.stats.binom.ppf((1 - level) / 2, n, 0.5))
+    while k > 0 and scipy.stats.binom.cdf(k - 1, n, 0.5) > (1 - level) / 2:
         k -= 1
     return (x[k - 1], x[n - k]) if k > 0 else (np.nan, np.nan)
 
@@ -127,8 +127,8 @@ def fields_needed(mean, sd, error, level=LEVEL):
     if not (np.isfinite([mean, sd]).all() and mean != 0):
         return np.nan
     ratio, n = sd / (error * abs(mean)), 2
-    while stats.t.ppf(0.5 + level / 2, n - 1) * ratio > np.sqrt(n):
-        n = max(n + 1, int((stats.norm.ppf(0.5 + level / 2) * ratio) ** 2))
+    while scipy.stats.t.ppf(0.5 + level / 2, n - 1) * ratio > np.sqrt(n):
+        n = max(n + 1, int((scipy.stats.norm.ppf(0.5 + level / 2) * ratio) ** 2))
     return float(n)
 
 
@@ -141,10 +141,10 @@ def between_fields(means, errors, wanted=0.05):
         return {"n": 0}
     sd = np.std(means, ddof=1) if n > 1 else np.nan
     within = np.sqrt(np.nanmean(errors ** 2)) if np.isfinite(errors).any() else np.nan
-    spread = stats.chi2.ppf([0.975, 0.025], n - 1) if n > 1 else [np.nan] * 2
+    spread = scipy.stats.chi2.ppf([0.975, 0.025], n - 1) if n > 1 else [np.nan] * 2
     sd_range = sd * np.sqrt((n - 1) / np.asarray(spread))
     total = np.sum(np.abs(means))
-    trimmed = stats.trim_mean(means, TRIM)
+    trimmed = scipy.stats.trim_mean(means, TRIM)
     return {
         "n": n, "mean": means.mean(), "sd_between": sd, "sd_between_95": tuple(sd_range), "se_between": sd / np.sqrt(n),
         "se_within": within,

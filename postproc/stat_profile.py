@@ -14,7 +14,7 @@ J is the scatter of the fields drawn. Where fields differ in level, those that b
 than any of these, and the interval does not hold it as often as it says (stat_alike.py; README.md has numbers).
 """
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: c = 1, and the quantile of the normal distribution
 STEPS = 60        # doublings of the distance before an interval counts as open
@@ -53,7 +53,8 @@ def dispersion(minus_log_likelihoods, quantity, theta):
 
 def drop(fields, c=1.0, level=0.95):
     """Fall of the log-likelihood at the ends of the interval."""
-    quantile = stats.t.ppf(0.5 + level / 2, fields - 1) if fields >= LEAST_FIELDS else stats.norm.ppf(0.5 + level / 2)
+    quantile = (scipy.stats.t.ppf(0.5 + level / 2, fields - 1) if fields >= LEAST_FIELDS else
+                scipy.stats.norm.ppf(0.5 + level / 2))
     return 0.5 * c * quantile ** 2
 
 
@@ -68,8 +69,9 @@ def interval(minus_log_likelihood, best, rest, fall, first):
         # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values
         # are very unlikely ones: the search takes differences.
         simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
-        found = optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
-                                  options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400, "initial_simplex": simplex})
+        found = scipy.optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
+                                        options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400,
+                                                 "initial_simplex": simplex})
         return found.fun - least - fall, found.x
     ends = []
     for sign in (-1, 1):

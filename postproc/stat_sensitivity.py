@@ -18,7 +18,7 @@ share out what it does explain.
 import itertools
 
 import numpy as np
-from scipy import stats
+import scipy
 
 FEW = 6              # different values up to which a parameter is a choice among levels
 MOST_DEGREE = 10
@@ -35,7 +35,7 @@ def scores(column):
     if column.dtype == object:
         names = list(dict.fromkeys(column))
         column = np.array([names.index(v) for v in column], dtype=float)
-    return (stats.rankdata(column) - 0.5) / len(column)
+    return (scipy.stats.rankdata(column) - 0.5) / len(column)
 
 
 def _residual(y, others):
@@ -48,7 +48,7 @@ def _interval(r, n, others):
     freedom = n - others - 3
     if freedom < 1 or not np.isfinite(r) or abs(r) >= 1:
         return (r, r) if abs(r) >= 1 else (np.nan, np.nan)
-    half = stats.norm.ppf(0.975) * np.sqrt(1.06 / freedom)
+    half = scipy.stats.norm.ppf(0.975) * np.sqrt(1.06 / freedom)
     return float(np.tanh(np.arctanh(r) - half)), float(np.tanh(np.arctanh(r) + half))
 
 
@@ -57,7 +57,7 @@ def rank_correlations(parameters, y):
     names = [
         k for k, v in parameters.items() if np.asarray(v).dtype != object and np.ptp(np.asarray(v, dtype=float)) > 0
     ]
-    n, ranks, target = len(y), {k: stats.rankdata(parameters[k]) for k in names}, stats.rankdata(y)
+    n, ranks, target = len(y), {k: scipy.stats.rankdata(parameters[k]) for k in names}, scipy.stats.rankdata(y)
     out = {}
     for name in names:
         rho = float(np.corrcoef(ranks[name], target)[0, 1])

@@ -9,9 +9,9 @@ import faults
 from faults import SCENARIOS, chosen, not_durable
 
 # runs of each scenario; with ranks, and with three members, each takes seconds
-MOST = {"run": 24, "resume": 16, "run --force": 24, "field": 12, "field to GeoJSON": 8, "run --dump-contacts": 8,
-        "ensemble": 6, "ensemble, 2 jobs": 5, "ensemble, 2 jobs, the second": 5, "2 ranks": 3,
-        "2 ranks, the second": 3, "run --force, 2 ranks": 3}
+MOST = {"run": 12, "resume": 10, "run --force": 12, "field": 6, "field to GeoJSON": 6, "run --dump-contacts": 6,
+        "ensemble": 3, "ensemble, 2 jobs": 3, "ensemble, 2 jobs, the second": 3, "2 ranks": 2,
+        "2 ranks, the second": 2, "run --force, 2 ranks": 2}
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_no_memory(scenarios, name):
     """Refused at some requests of the program's own code."""
     scenario, _ = scenarios(name)
     wrong = []
-    for n in faults.numbers(scenario.requests(), 10):
+    for n in faults.numbers(scenario.requests(), 6):
         try:
             scenario.starve(n)
         except (AssertionError, OSError, KeyError) as e:
