@@ -24,7 +24,7 @@ one() {
         *) f=1 ;;
         esac ;;
     *)
-        timeout 900 "$2" >"$file.log" 2>&1 # one that hangs is a failure, and no end of the others
+        OMP_NUM_THREADS=1 timeout 900 "$2" >"$file.log" 2>&1 # one that hangs is a failure, and no end of the others
         code=$?
         p=$(sed -n 's/.*PASSED.* \([0-9][0-9]*\) test(s).*/\1/p' "$file.log" | tail -1)
         f=$(sed -n 's/^ *\([0-9][0-9]*\) FAILED TEST(S).*/\1/p' "$file.log" | tail -1)
@@ -46,6 +46,7 @@ if [ "$1" = --one ]; then
     exit 0
 fi
 
+# Compiled tests run side by side, each on one thread unless it sets their number: teams for its small scenes only cost.
 # On a busy machine threads that spin at a barrier keep the others from the core, and everything stalls; bergtow itself
 # sees to this in main.c.
 export GOMP_SPINCOUNT="${GOMP_SPINCOUNT:-5000}"

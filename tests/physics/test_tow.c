@@ -393,8 +393,8 @@ static void a_stopped_programme_leaves_the_vessel_to_its_drag(void **state)
 static void rows_and_contacts_are_one_system(void **state)
 {
     (void)state;
-    const double stiff[] = {1e2, 1e5, 1e8};
-    for (int i = 0; i < 3; i++) {
+    const double stiff[] = {1e2, 1e8};
+    for (int i = 0; i < 2; i++) {
         bt_params p = scene_params(5, 1);
         p.tolerance = 1e-8;
         bt_world *w = bt_world_create(&p);
