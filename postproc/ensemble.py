@@ -371,11 +371,9 @@ def main(argv=None):
     print(ensemble_text.report(s, a.markdown))
     print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
     if s["holes"] and not a.partial:
-        raise RunError(
-            e.path, s["holes"],
-            "run `bergtow ensemble` again, with --retry-failed for those that failed, or take what there is with "
-            "--partial"
-        )
+        again = "" if np.all(e.status == FINISHED) else "run `bergtow ensemble` again, with --retry-failed for those " \
+            "that failed, or "
+        raise RunError(e.path, s["holes"], f"{again}take what there is with --partial")
 
 
 if __name__ == "__main__":

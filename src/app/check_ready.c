@@ -120,10 +120,8 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
 static void warn_of_track(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
     if (n->count < 1) return;
-    double ice[2], body[2];
-    bt_setup_drift(c, n->size, n->thickness, ice, body);
-    bt_case_warn_lead(c, ice[0] * c->run.duration, ice[1] * c->run.duration, warnings);
     bt_track t = bt_setup_track(c, n->size, n->thickness, n->concentration);
+    bt_case_warn_lead(c, t.drift[0], t.drift[1], warnings);
     bt_track_warn(c, &t, warnings);
     if (c->domain.ends == BT_BOUND_MOVING) {
         bt_summary_window_warn_laps(warnings, bt_track_laps(c, &t));

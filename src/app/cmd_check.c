@@ -90,6 +90,9 @@ static void print_ice(const bt_case *c, const bt_field *f, const bt_check_ice *n
            c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
 }
 
+/// 0 for what rounding has left of it, m.
+static double whole(double x) { return fabs(x) < 1e-9 ? 0 : x; }
+
 static void print_line(const bt_case *c)
 {
     const bool thrust = c->tow.mode == BT_TOW_THRUST;
@@ -98,8 +101,9 @@ static void print_line(const bt_case *c)
            (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
            c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load,
            c->tow.line.breaking_load > 0 ? "" : " = never breaks");
-    printf("line, fastened       at (%.4g, %.4g) m", c->tow.hull_x, c->tow.hull_y);
-    if (c->tow.line.branches > 1) printf(" and (%.4g, %.4g) m", c->tow.branch2.hull_x, c->tow.branch2.hull_y);
+    printf("line, fastened       at (%.4g, %.4g) m", whole(c->tow.hull_x), whole(c->tow.hull_y));
+    if (c->tow.line.branches > 1)
+        printf(" and (%.4g, %.4g) m", whole(c->tow.branch2.hull_x), whole(c->tow.branch2.hull_y));
     printf(" from the centroid of the waterline, along the body's own x and y\n");
     if (c->tow.line.type != BT_ROPE_NUMBERS)
         printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight "

@@ -77,6 +77,15 @@ bool bt_case_key_is_idle(const bt_case *c, const char *key)
     return false;
 }
 
+void bt_case_ice_region(const bt_case *c, double low[2], double high[2])
+{
+    const double whole[4] = {c->domain.x0, c->domain.y0, c->domain.x0 + c->domain.length,
+                             c->domain.y0 + c->domain.width},
+                 given[4] = {c->ice.x_min, c->ice.y_min, c->ice.x_max, c->ice.y_max};
+    const double *of = c->ice.field ? whole : given;
+    for (int k = 0; k < 2; k++) low[k] = of[k], high[k] = of[2 + k];
+}
+
 double bt_case_made_area(const bt_case *c)
 {
     if (bt_case_reads_field(c)) return 0;

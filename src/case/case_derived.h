@@ -31,6 +31,9 @@ bool bt_case_ice_is_random(const bt_case *c);
 /// Is this a key of how ice is made, of no effect on that of this case, which is read?
 bool bt_case_key_is_idle(const bt_case *c, const char *key);
 
+/// The ice region, x and y: of a field file, which has its own, all of the domain.
+void bt_case_ice_region(const bt_case *c, double low[2], double high[2]);
+
 /// Area of the ice that is made, concentration × ice region less body and floes given by hand, m²; 0 without a
 /// generator.
 double bt_case_made_area(const bt_case *c);

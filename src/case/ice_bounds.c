@@ -146,7 +146,8 @@ double bt_ice_closed(const bt_case *c, double area)
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
     const double body = n ? bt_shape_moments(n, v).area : 0;
-    return area / ((c->domain.length - x) * (c->domain.width - y) - body);
+    const double room = (c->domain.length - x) * (c->domain.width - y) - body;
+    return room > 0 ? area / room : area > 0 ? INFINITY : 0;
 }
 
 void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings)

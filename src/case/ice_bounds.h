@@ -41,8 +41,8 @@ const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum
 /// The same of a field, and of its floes in the domain of a case: mean size and ice area no larger than that.
 const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT_ICE_WHY]);
 
-/// Concentration to which closing walls bring ice of this area, all floes, by the end of the run; 0 where none close,
-/// or ice can leave, raft or be crushed.
+/// Concentration to which closing walls bring ice of this area, all floes, by the end of the run: INFINITY where the
+/// body takes all of the room; 0 where none close, or ice can leave, raft or be crushed.
 double bt_ice_closed(const bt_case *c, double area);
 
 /// Warn of walls that pack it (estimate.phi_j).

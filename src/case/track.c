@@ -82,7 +82,8 @@ static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size)
 {
     const bt_bound kind[2] = {c->domain.ends, c->domain.sides};
     const double first[2] = {c->domain.x0, c->domain.y0}, extent[2] = {c->domain.length, c->domain.width};
-    double low[2] = {c->ice.x_min, c->ice.y_min}, high[2] = {c->ice.x_max, c->ice.y_max};
+    double low[2], high[2];
+    bt_case_ice_region(c, low, high);
     for (int k = 0; k < 2; k++) {
         // up to a wall, which holds ice that drifts, and the body
         const bool wall = kind[k] == BT_BOUND_WALL;

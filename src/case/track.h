@@ -18,6 +18,7 @@
 typedef struct bt_track {
     int64_t n;
     const double *time, *x, *y; ///< [n] s, m; NaN where not known
+    double drift[2];            ///< of a planned one: how far the ice drifts in the whole run, m
 } bt_track;
 
 /// Largest speed from one point to the next, m/s.

@@ -41,9 +41,10 @@ bt_packing bt_packing_of(const bt_case *c, double concentration)
     }
     const double low = x ? c->domain.x0 : c->domain.y0, length = x ? c->domain.length : c->domain.width,
                  W = x ? c->domain.width : c->domain.length;
-    const double ice_low = x ? c->ice.x_min : c->ice.y_min, ice_high = x ? c->ice.x_max : c->ice.y_max;
+    double ice_low[2], ice_high[2];
+    bt_case_ice_region(c, ice_low, ice_high);
     const double L = (sign > 0 ? low + length : -low) - bow,
-                 ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high : -ice_low) - bow));
+                 ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high[!x] : -ice_low[!x]) - bow));
     const double ahead = c->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)));
     const double room = W * (p.packed * L - concentration * ice), taken = p.packed * W - concentration * (W - b);
     p.way = room <= 0 ? 0 : room / taken;

@@ -141,6 +141,13 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
                s->residual, BT_STEADY_RESIDUAL, speed);
 }
 
+/// When the body is where its towing end was at this time, by the planned speed: a body on a line turns until then.
+static double followed(const bt_case *c, double time)
+{
+    if (c->tow.mode == BT_TOW_SPEED) return time;
+    return bt_case_tow_time(c, bt_case_tow_distance(c, time) + c->tow.line_length);
+}
+
 /// What happened within the window that no mean goes across.
 static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
@@ -156,12 +163,13 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
         const bt_event *e = &t->events->event[i];
         if (e->kind == BT_EVENT_ADRIFT)
             decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
-        else if (e->kind == BT_EVENT_WAYPOINT && e->time > s->start && e->time < s->end &&
+        else if (e->kind == BT_EVENT_WAYPOINT && e->time < s->end && followed(c, e->time) > s->start &&
                  bt_case_tow_turn(c, (int)e->subject - 1) > BT_TURN)
             decide(s, BT_NOT_STEADY,
-                   "the course changes by %.3g deg at way-point %d, passed at %g s, within the window: end the run "
+                   "the course changes by %.3g deg at way-point %d, passed at %g s, within the window%s: end the run "
                    "before, or read the series",
-                   bt_case_tow_turn(c, (int)e->subject - 1) * 180 / BT_PI, (int)e->subject, e->time);
+                   bt_case_tow_turn(c, (int)e->subject - 1) * 180 / BT_PI, (int)e->subject, e->time,
+                   e->time > s->start ? "" : " for the body, a line's length behind");
         else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
             decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after",
                    e->time);

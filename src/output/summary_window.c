@@ -18,7 +18,7 @@ void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
 {
     if (!(laps > 1)) return;
     bt_errors_add(warnings,
-                  "the moving window has gone %.2f times its length through the ice: the body meets the same field "
+                  "the moving window goes %.2f times its length through the ice: the body meets the same field "
                   "again after each, with the hole in which it stood at time zero; samples a length apart are not "
                   "independent, and the standard error may be too small; take a longer domain, or several values of "
                   "ice.seed",

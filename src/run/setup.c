@@ -260,18 +260,20 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
     bt_undisturbed_create(w, 1, held);
     bt_tow *tow = bt_setup_tow(c);
     double *time = bt_alloc(POINTS, sizeof *time), *x = bt_alloc(POINTS, sizeof *x), *y = bt_alloc(POINTS, sizeof *y);
+    bt_track t = {.n = POINTS, .time = time, .x = x, .y = y};
     for (int i = 0; i < POINTS; i++, w->step++) {
         double d[2];
         time[i] = c->run.duration * i / (POINTS - 1);
         bt_setup_tow_displacement(c, tow, bt_case_tow_distance(c, time[i]), d);
-        x[i] = c->body.x + d[0] - w->undisturbed->drift_x;
-        y[i] = c->body.y + d[1] - w->undisturbed->drift_y;
+        t.drift[0] = w->undisturbed->drift_x, t.drift[1] = w->undisturbed->drift_y;
+        x[i] = c->body.x + d[0] - t.drift[0];
+        y[i] = c->body.y + d[1] - t.drift[1];
         bt_environment_begin(w);
         bt_undisturbed_advance(w);
     }
     bt_tow_free(tow);
     bt_world_free(w);
-    return (bt_track){.n = POINTS, .time = time, .x = x, .y = y};
+    return t;
 }
 
 void bt_setup_track_free(bt_track *t)
@@ -400,11 +402,12 @@ static bool check_closing(const bt_case *c, const bt_field *f, bt_errors *err)
     const double made = f->n > 0 ? f->concentration * f->ice_area : bt_case_made_area(c),
                  closed = bt_ice_closed(c, made + bt_case_area_by_hand(c));
     if (!(closed >= 1) || c->guard.overlap == 0) return true;
+    char how[64] = "none beside the body";
+    if (isfinite(closed)) snprintf(how, sizeof how, "which would be a concentration of %.3g", closed);
     bt_errors_add(err,
-                  "%s: domain.%s_closing: by the end of the run the walls leave less room than rigid floes take, which "
-                  "would be a concentration of %.3g; slow them, shorten run.duration, or set ice.crushing.pressure or "
-                  "ice.rafting.kappa",
-                  c->path ? c->path : "case", c->domain.ends_closing > 0 ? "ends" : "sides", closed);
+                  "%s: domain.%s_closing: by the end of the run the walls leave less room than rigid floes take, %s; "
+                  "slow them, shorten run.duration, or set ice.crushing.pressure or ice.rafting.kappa",
+                  c->path ? c->path : "case", c->domain.ends_closing > 0 ? "ends" : "sides", how);
     return false;
 }
 

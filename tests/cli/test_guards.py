@@ -7,7 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CLOSING, DONE, NUMERIC, SIGNAL, TOW, Run, call, changed, placed, run, worst_overlap, write_case
+from harness import (CASE, CLOSING, DONE, NUMERIC, SIGNAL, TOW, Run, call, changed, placed, run, worst_overlap,
+                     write_case)
 
 # A floe of 10¹⁶ kg at 100 m/s: more energy than sums hold.
 HEAVY = {
@@ -79,6 +80,20 @@ def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
     r = run(tmp_path, changed(TOW, air__wind_x=15, guard__energy=1e-3), "--quiet", code=NUMERIC)
     assert re.search(r"step \d+: the bodies have \S+ J of kinetic energy, more than the \S+ J that guard.energy allows",
                      r.result.stderr)
+
+
+@pytest.mark.parametrize("speed, said",
+                         [(0.02, "which would be a concentration of 1.59"), (0.048, "none beside the body")])
+def test_walls_that_leave_rigid_floes_no_room_are_refused(tmp_path, speed, said):
+    """Also where the body alone is larger than what they leave: there is no concentration then."""
+    path = write_case(tmp_path, {
+        "run": {"dt": 0.1, "duration": 100}, "domain": {"length": 10, "width": 8, "ends_closing": speed},
+        "ice": {"concentration": 0.9, "size": 0.8}, "body": {"length": 2.8, "x": 5, "draft": 0.4},
+        "tow": {"mode": "none"}})
+    r = call("check", path)
+    assert r.returncode == CASE and f"less room than rigid floes take, {said}" in r.stderr, r.stderr
+    assert call("check", path, "--set", "guard.overlap=0").returncode == DONE
+    assert call("check", path, "--set", "ice.crushing.pressure=1000").returncode == DONE
 
 
 # ---- the last state ----

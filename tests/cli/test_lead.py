@@ -98,6 +98,9 @@ def test_a_lead_that_drifts_away_is_reported(tmp_path):
     text = "lead.width: the ice drifts by"
     assert text in call("check", path).stdout and warned(run(tmp_path, case, "--quiet"), text)
     assert text not in call("check", path, "--set", "water.current_y=0.02").stdout
+    resting = changed(case, ice__start="rest", run__duration=40)
+    assert text in call("check", write_case(tmp_path, resting)).stdout
+    assert warned(run(tmp_path, resting, "--quiet", name="rest"), text)
 
 
 def test_a_polygon_has_the_lead_of_the_shape_it_draws(tmp_path):

@@ -647,6 +647,8 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     s, text = of_all(folder)
     e, (c,) = Ensemble(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
+    told = script("ensemble.py", folder, "--resamples", 1, "--force").stderr
+    assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
     towed = e.series(0)[1][300:900].mean()
     assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
     assert c["resistance"]["mean"] == np.mean([e.mean[m] for m in e.used]) and c["resistance"]["min"] > 0.98e6

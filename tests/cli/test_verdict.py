@@ -282,6 +282,18 @@ def test_a_body_that_leaves_the_ice_is_no_steady_tow(tmp_path, changes, at):
         assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(at, rel=0.02), text
 
 
+def test_the_region_of_a_field_file_is_its_own(tmp_path):
+    """That of the base, without effect on ice that is read, is no end of it."""
+    base = changed(ROUND, domain__ends="open", run__duration=800)
+    assert call("field", write_case(tmp_path, base), "-o", "field.h5", cwd=tmp_path).returncode == DONE
+    write_case(tmp_path, changed(base, ice__x_max=0), "base.yml")
+    case = {"base": "base.yml", "ice": {"field": "field.h5"}}
+    checked = call("check", write_case(tmp_path, case)).stdout
+    reason = run(tmp_path, case, "--quiet").summary["window"]["reason"]
+    for text in (checked, reason):
+        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(400, rel=0.02), text
+
+
 def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
     """A vessel that pulls next to nothing, in open water, where nothing holds the body."""
     case = changed(BERG, ice={"concentration": 0}, run__duration=600, tow={
