@@ -5,13 +5,13 @@ import re
 
 import pytest
 
-from harness import BERGTOW, DONE
+from harness import BERGTOW, DONE, quick
 from test_ranks_output import mpirun
 
 PROGRAM = os.path.join(os.path.dirname(BERGTOW), "tests/parallel/copies")
 
 
-@pytest.mark.parametrize("ranks", [2, 3, 4])
+@pytest.mark.parametrize("ranks", quick([2, 3, 4], 3))
 def test_ranks_hold_what_they_need(ranks):
     result = mpirun(ranks, program=(PROGRAM, ))
     assert result.returncode == DONE, result.stderr

@@ -6,7 +6,7 @@ import h5py
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, launcher, run
+from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, launcher, quick, run
 from resuming import assert_same_result, done
 
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
@@ -28,7 +28,7 @@ def one(request, tmp_path_factory):
     return folder, run(folder, CASES[request.param], "--threads", 1)
 
 
-@pytest.mark.parametrize("ranks, threads", [(1, 3), (2, 1), (3, 2)])
+@pytest.mark.parametrize("ranks, threads", quick([(1, 3), (2, 1), (3, 2)], (1, 3), (3, 2)))
 def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     folder, alone = one
     result = subprocess.run([

@@ -8,7 +8,7 @@ area that was looked at before the poses of the step, sheets in the order of mem
 import h5py
 import pytest
 
-from harness import changed, run
+from harness import changed, quick, run
 from resuming import assert_same_result
 from test_everything import ALL
 from test_ranks import LINE, assert_same, many
@@ -47,7 +47,7 @@ def test_the_case_is_worth_it(alone):
         assert s["max_overlap_relative"] < 0.01  # rafted overlap is none
 
 
-@pytest.mark.parametrize("ranks, threads", [(1, 2), (2, 2), (3, 1)])
+@pytest.mark.parametrize("ranks, threads", quick([(1, 2), (2, 2), (3, 1)], (1, 2), (3, 1)))
 def test_ranks_and_threads(alone, ranks, threads):
     _, folder, one = alone
     assert_same(one, many(folder, ranks, threads))

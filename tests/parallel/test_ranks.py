@@ -9,7 +9,7 @@ contact knew of the last step left behind when it goes to another rank. Each was
 import numpy as np
 import pytest
 
-from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, run, write_case
+from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, quick, run, write_case
 from test_ranks_output import mpirun
 
 # A heavy berg on a line: one rank does its contacts, and the tiles under it go with it. Tiles are small, so that there
@@ -98,6 +98,8 @@ PAIRS = {
     "crush": [(1, 4), (2, 2), (3, 1)],
     "ring": [(1, 2), (4, 1)],
 }
+LAYOUTS = quick([(n, *p) for n, pairs in PAIRS.items() for p in pairs], ("line", 1, 2), ("line", 3, 2), ("speed", 2, 2),
+                ("jam", 2, 1), ("seams", 4, 2), ("round", 3, 2), ("tide", 2, 2), ("crush", 3, 1), ("ring", 4, 1))
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
@@ -164,7 +166,7 @@ def test_the_cases_show_what_they_are_for(alone, name):
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 
 
-@pytest.mark.parametrize("name, ranks, threads", [(n, *p) for n, pairs in PAIRS.items() for p in pairs])
+@pytest.mark.parametrize("name, ranks, threads", LAYOUTS)
 def test_the_same_bits(alone, name, ranks, threads):
     folder, one = alone(name)
     r = many(folder, ranks, threads)
@@ -193,8 +195,9 @@ def test_floes_at_a_free_body_that_other_ranks_hold(tmp_path):
     assert_same(run(tmp_path, case, "--threads", 1, "--quiet"), many(tmp_path, 3, 1))
 
 
-@pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
-                                                   ("ring", 2, 2), ("ring", 4, 1)])
+@pytest.mark.parametrize("name, ranks, threads", quick([("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
+                                                         ("ring", 2, 2), ("ring", 4, 1)],
+                                                        ("line", 3, 2), ("jam", 3, 1), ("ring", 2, 2)))
 def test_the_division_is_sound(alone, name, ranks, threads):
     """In the validation build: every body that several ranks hold is the same there, bit for bit, after each migration
     and every 20 steps; threads share every loop, however few the contacts. And another optimisation gives the same
@@ -234,7 +237,7 @@ SMALL = {
 }
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", quick(SMALL, "fewer tiles than ranks", "one floe", "none", "a berg alone"))
 def test_ranks_that_own_nothing(tmp_path, name):
     """Two of three ranks where there is a floe or none; of seven, where there are four or six tiles."""
     one = run(tmp_path, SMALL[name], "--threads", 1, "--quiet")

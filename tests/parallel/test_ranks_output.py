@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from harness import (BERGTOW, CASE, DONE, IO, RANK, SIGNAL, TOW, USAGE, Run, call, changed, differing, environment,
-                     launcher, machine_keys, rank_of, run, write_case)
+                     launcher, machine_keys, quick, rank_of, run, write_case)
 from resuming import children
 
 # More frames than a chunk of the series, more floes than a rank's share, a body and walls; hand-made floes have the ids
@@ -55,7 +55,7 @@ def one(tmp_path_factory):
     return folder, run(folder, SHORT, "--threads", 1)
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize("ranks", quick([1, 2, 3, 4], 1, 3))
 def test_values_do_not_depend_on_ranks(one, ranks):
     folder, alone = one
     result = mpirun(ranks, "run", "case.yml", "-o", f"out{ranks}", "--threads", 1, cwd=folder)

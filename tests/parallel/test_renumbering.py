@@ -7,6 +7,8 @@ import pytest
 
 from harness import call, changed, reading, run
 
+pytestmark = pytest.mark.slow
+
 # Loose enough that no jam decides on the force: in one, a single contact more or less is another history.
 CASE = {
     "run": {"dt": 0.1, "duration": 90},

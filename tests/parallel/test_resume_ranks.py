@@ -13,7 +13,7 @@ import time
 import h5py
 import pytest
 
-from harness import SIGNAL, Run, changed
+from harness import SIGNAL, Run, changed, quick
 from resuming import assert_same_result, check_readable, done, killed_after, started, uninterrupted
 from test_everything import ALL
 from test_outlines_ranks import with_bays
@@ -29,7 +29,7 @@ def whole(tmp_path_factory):
     return folder, path, seconds
 
 
-@pytest.mark.parametrize("before, after, steps", [(1, 2, 89), (2, 1, 94), (2, 4, 95)])
+@pytest.mark.parametrize("before, after, steps", quick([(1, 2, 89), (2, 1, 94), (2, 4, 95)], (1, 2, 89), (2, 4, 95)))
 def test_on_other_ranks(whole, before, after, steps):
     """Stopped in the middle of a sample of three steps, between two frames, with a collision under way."""
     folder, path, _ = whole
