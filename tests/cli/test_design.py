@@ -99,8 +99,9 @@ PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration
 
 @pytest.mark.parametrize("case, more, wider", [
     (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}), (PERIODIC, ("--keep-width",), None),
-    (PERIODIC, ("--set", "domain.width=6 m"), None), (changed(PERIODIC, domain__y0=-2.5), (), None),
-    (PERIODIC, ("--set", "domain.sides=wall"), None)
+    pytest.param(PERIODIC, ("--set", "domain.width=6 m"), None, marks=pytest.mark.slow),
+    pytest.param(changed(PERIODIC, domain__y0=-2.5), (), None, marks=pytest.mark.slow),
+    pytest.param(PERIODIC, ("--set", "domain.sides=wall"), None, marks=pytest.mark.slow)
 ])
 def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, case, more, wider):
     write_case(tmp_path, case)

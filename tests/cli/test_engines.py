@@ -65,6 +65,7 @@ def until(what, seconds=60):
     return found
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_costs_nothing(client, tmp_path):
     """The worker and its call of the program are killed in the middle of a member; another goes on with it."""
     path, out = study(tmp_path, 20), tmp_path / "out"
