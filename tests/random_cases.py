@@ -501,6 +501,13 @@ def idle(values):
         yield "ice.crushing.least_length"
     if "water.tide.major" not in values:
         yield from ("water.tide.inclination", "water.tide.phase")
+    conversion = values.get("impact.conversion", "duration")
+    if conversion != "duration":
+        yield "impact.duration"
+    if conversion != "crushing":
+        yield from ("impact.pressure", "impact.corner", "impact.corner_angle")
+    if conversion == "none":
+        yield "impact.least_speed"
     if "wall" not in (values["domain.ends"], values["domain.sides"]):
         yield from ("domain.wall_friction", "domain.wall_restitution")
 

@@ -14,7 +14,6 @@
 #include "case/case_check.h"
 #include "case/schema.h"
 
-
 /// Keys that are not used.
 typedef struct idle {
     bool so;
@@ -27,7 +26,7 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { RULES = 18 };
+enum { RULES = 21 };
 
 static void list(const bt_case *c, idle out[RULES])
 {
@@ -76,6 +75,12 @@ static void list(const bt_case *c, idle out[RULES])
          "without a tide (water.tide.major)"},
         {!walls, "domain.wall_friction domain.wall_restitution", "domain.ends domain.sides",
          "without walls (domain.ends, domain.sides)"},
+        {c->impact.conversion != BT_IMPACT_DURATION, "impact.duration", "impact.conversion",
+         "without impact.conversion: duration"},
+        {c->impact.conversion != BT_IMPACT_CRUSHING, "impact.pressure impact.corner impact.corner_angle",
+         "impact.conversion", "without impact.conversion: crushing"},
+        {c->impact.conversion == BT_IMPACT_NONE, "impact.least_speed", "impact.conversion",
+         "where collisions are not told apart (impact.conversion)"},
     };
     memcpy(out, all, sizeof all);
 }

@@ -261,6 +261,15 @@ def test_bad_values_are_refused(tmp_path, key, value):
     assert r.returncode == CASE and f"impact.{key}" in r.stderr
 
 
+@pytest.mark.parametrize("impact, key", [({"pressure": "1 MPa", "corner_angle": 60}, "corner_angle"),
+                                         ({"corner": "real"}, "corner"),
+                                         ({"conversion": "crushing", "duration": "0.2 s"}, "duration"),
+                                         ({"conversion": "none", "least_speed": 0.01}, "least_speed")])
+def test_keys_of_another_conversion_are_refused(tmp_path, impact, key):
+    r = call("check", write_case(tmp_path, changed(TOW, impact=impact)))
+    assert r.returncode == CASE and f"impact.{key}: has no effect" in r.stderr and "impact.conversion" in r.stderr
+
+
 def test_the_picture_shows_what_the_file_holds(line, tmp_path):
     with Folder(line.dir) as folder:
         outlines = plot_impacts.along_hull(folder)
