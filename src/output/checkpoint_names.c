@@ -18,7 +18,7 @@ static const row rows[] = {
     {"about/revision", NULL, "revision of its sources", "one"},
     {"about/written", NULL, "date and time at which it was written", "one"},
     {"about/command_line", NULL, "command line of the run", "one"},
-    {"about/case_as_given", NULL, "the case file as it was given", "one"},
+    {"about/case_as_given", NULL, "the case file as it was given, with a document of what was set", "one"},
     {"about/case_path", NULL, "path of the case file", "one"},
     {"about/ranks", "1", "MPI ranks of the run", "one"},
     {"about/threads", "1", "threads of each rank", "one"},

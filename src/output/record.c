@@ -173,7 +173,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
         bt_h5_write_text(&r->h5, "/case", resolved);
         bt_h5_write_text(&r->h5, "/case_as_given", c->text ? c->text : "");
         bt_h5_describe(&r->h5, "/case", NULL, NULL, "the case with every key, in SI units");
-        bt_h5_describe(&r->h5, "/case_as_given", NULL, NULL, "the case file as it was given");
+        bt_h5_describe(&r->h5, "/case_as_given", NULL, NULL,
+                       "the case file as it was given, and in a second document what a study or --set changed");
         bt_h5_describe_file(&r->h5, c->run.title);
         create_series(r);
         create_events(r);
