@@ -48,11 +48,12 @@ endif
 OPT_release := -O3 -g -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -DBT_VALIDATE
-OPT_asan    := -O1 -g1 -fsanitize=address,undefined,float-cast-overflow \
+# BT_VALIDATE: checks of the division among ranks, and every loop that may run in parallel does.
+OPT_asan    := -O1 -g1 -DBT_VALIDATE -fsanitize=address,undefined,float-cast-overflow \
                -fno-sanitize-recover=undefined,float-cast-overflow
 OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow \
                -fno-sanitize-recover=undefined,float-cast-overflow
-# BT_VALIDATE: every loop that may run in parallel does. The thread sanitizer does not know gcc's libgomp, hence clang.
+# The thread sanitizer does not know gcc's libgomp, hence clang.
 OPT_tsan    := -O1 -g -fsanitize=thread -DBT_VALIDATE -Wno-pass-failed
 OPT_coverage := -O1 -g --coverage -fprofile-abs-path -fprofile-update=atomic
 ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
@@ -278,7 +279,6 @@ deps-test: ## install what make test needs
 
 test: deps-test ## every test: units, known answers, same bits, command line, short runs under the sanitizers
 	@$(AGAIN) all lib tests
-	@$(AGAIN) CONFIG=validate all
 	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)

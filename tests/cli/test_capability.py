@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness import BERGTOW, ROOT, TOW, changed, environment, run, write_case
+from harness import BERGTOW, ROOT, TOW, changed, environment, quick, run, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -58,7 +58,7 @@ def test_the_evidence_is_a_fair_bet(share):
 
 
 @pytest.mark.parametrize("falls", [True, False])
-@pytest.mark.parametrize("scale", [0.001, 0.03])
+@pytest.mark.parametrize("scale", quick([0.001, 0.03], 0.03))
 def test_the_bracket_holds_the_limit(scale, falls):
     """Logistic chances with the limit anywhere; a steep one needs few trials and is found to the resolution."""
     rng, missed, trials, errors = np.random.default_rng(3), 0, [], []
@@ -292,6 +292,7 @@ OPEN_WATER = changed(THRUST, ice__concentration=0.01, domain__length=30, run__du
                      tow__ramp=1, tow__speed=0.4)
 
 
+@pytest.mark.slow
 def test_the_bollard_pull_that_open_water_asks_for(tmp_path):
     """Hardly any ice: the vessel is enough where its net pull at the speed meets the drag of the body."""
     found, text = found_in(tmp_path, OPEN_WATER, "--search", "tow.vessel.bollard_pull", "--from", "1 N", "--to", "60 N",

@@ -446,6 +446,7 @@ def test_a_warning_of_many_conditions_names_the_first():
     assert loads_text.several(list("abcdefg")) == "a; b; c; d; and 3 more conditions"
 
 
+@pytest.mark.slow
 def test_options_of_the_design_value(statement, tmp_path):
     folder, _, before = statement
     result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--tow-hours", 2, "--probability", 0.5)

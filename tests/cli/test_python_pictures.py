@@ -146,6 +146,7 @@ def test_reports(towed, speeds, tmp_path):
     assert bergtow.report(towed, tmp_path / "mine.html", replace=True).stat().st_size > 1e5
 
 
+@pytest.mark.slow
 def test_the_wheel_has_the_command(towed, tmp_path):
     """Installed by pip, with nothing of the source tree in reach."""
     env = environment(BERGTOW_LIB=str(LIBRARY))
