@@ -115,7 +115,7 @@ def test_the_wall_time(whole):
         result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr
     ), result.stderr
     pieces = 1
-    while call("resume", "walled", "--quiet", "--max-wall", "0.2s", cwd=folder).returncode == SIGNAL:
+    while call("resume", "walled", "--quiet", "--max-wall", "0.5s", cwd=folder).returncode == SIGNAL:
         pieces += 1
         assert pieces < 200
     assert_same_result(one.dir, folder / "walled")
