@@ -106,8 +106,8 @@ __attribute__((section(".preinit_array"), used)) static void (*const before_all)
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
 // microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where
 // the system gives them, and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C
-// library read their settings before main, hence the second start; the user's own win. Loading the libraries again takes
-// 50 ms, which commands without a time step are spared.
+// library read their settings before main, hence the second start; the user's own win. Loading the libraries again
+// takes 50 ms, which commands without a time step are spared.
 static void start_with_settings(int argc, char **argv)
 {
     const int command = argc > 1 ? command_of(argv[1]) : -1;
