@@ -280,7 +280,6 @@ deps-test: ## install what make test needs
 test: deps-test ## every test: units, known answers, same bits, command line, short runs under the sanitizers
 	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
-	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
 deps-long: ## install what make test-long needs
@@ -291,6 +290,7 @@ test-long: deps-long ## tests that take minutes: intervals over fields, long tow
 	@$(AGAIN) CONFIG=asan all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 	BERGTOW=build/release/bergtow $(PYTEST) -m slow tests/parallel tests/cli
+	@! command -v clang-14 >/dev/null || $(AGAIN) tsan
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help
 mutate: deps-test ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended

@@ -13,7 +13,7 @@ one() {
     start=$(date +%s)
     p=0 f=0 s=0
     case $2 in
-    asan | tsan | valgrind)
+    asan | valgrind)
         name="short runs under $2"
         corpus=
         [ "$2" != asan ] || corpus=build/asan/tests/fuzz/test_corpus
@@ -59,7 +59,7 @@ trap 'rm -rf "$dir"' EXIT
 long='/physics/\(test_tow\|test_motion\|test_resistance\)$'
 {
     printf '%s\n' "$@" | grep "$long"
-    printf '%s\n' valgrind asan tsan
+    printf '%s\n' valgrind asan
     printf '%s\n' "$@" | grep -v "$long"
 } >"$dir/list"
 xargs -n 1 -P "$workers" "$0" --one "$dir" <"$dir/list"

@@ -100,7 +100,6 @@ if [ -n "$short" ]; then
     steps=4
     case $kind in
     asan) cases='tow window' teams=2x2 ;;
-    tsan) cases=press teams=1x4 ;;
     valgrind) steps=2 cases=tow ;;
     esac
 fi
