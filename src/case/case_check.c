@@ -430,13 +430,6 @@ static void check_path(const check *k, int n, const double *v)
                    way, reach, time);
 }
 
-// After check_tow: the reference speed goes by it.
-static void follow_impact(bt_case *c)
-{
-    bt_check_fill(&c->impact.duration, c->run.dt);
-    bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
-}
-
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
@@ -533,7 +526,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check_tow(&k);
     bt_case_tow_ramp(c);
     bt_case_tow_check(&k);
-    follow_impact(c);
+    bt_case_fill_impact(c); // the reference speed goes by that of the tow
     if (placed) check_path(&k, n, v);
     bt_case_check_window(&k, n, v);
     check_water(&k);

@@ -24,6 +24,8 @@ static inline void bt_check_fill(double *member, double value)
 void bt_case_fill(bt_case *c);
 /// Those of domain, ice and body alone.
 void bt_case_fill_scene(bt_case *c);
+/// Those of collisions, once the tow has its own.
+void bt_case_fill_impact(bt_case *c);
 
 /// Absolute path of a file that is named in the file `from`, to whose folder it is relative; NULL where it is absolute,
 /// or that folder is not there.

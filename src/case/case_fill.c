@@ -23,6 +23,12 @@ void bt_case_fill_scene(bt_case *c)
     bt_check_fill(&c->body.restitution, c->ice.restitution);
 }
 
+void bt_case_fill_impact(bt_case *c)
+{
+    bt_check_fill(&c->impact.duration, c->run.dt);
+    bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
+}
+
 void bt_case_fill(bt_case *c)
 {
     double v[2 * BT_MAX_VERTICES];
@@ -32,4 +38,5 @@ void bt_case_fill(bt_case *c)
     bt_case_tow_hull(c, n, v);
     bt_case_tow_ramp(c);
     bt_case_lead_follow(c, n, v);
+    bt_case_fill_impact(c);
 }

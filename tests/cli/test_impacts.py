@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import CASE, IO, ROOT, TOW, call, changed, differing, run, write_case
+from harness import CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, write_case
 from resuming import assert_same_result, done, killed_after
 
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -268,6 +268,13 @@ def test_bad_values_are_refused(tmp_path, key, value):
 def test_keys_of_another_conversion_are_refused(tmp_path, impact, key):
     r = call("check", write_case(tmp_path, changed(TOW, impact=impact)))
     assert r.returncode == CASE and f"impact.{key}: has no effect" in r.stderr and "impact.conversion" in r.stderr
+
+
+@pytest.mark.parametrize("conversion", ["none", "duration", "crushing"])
+def test_keys_that_nobody_has_given_are_not_warned_of(tmp_path, conversion):
+    """Nor those that follow from others, as the duration does from the time step."""
+    r = call("check", write_case(tmp_path, changed(TOW, impact__conversion=conversion)))
+    assert r.returncode == DONE and "no effect" not in r.stdout
 
 
 def test_the_picture_shows_what_the_file_holds(line, tmp_path):
