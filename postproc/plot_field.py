@@ -113,7 +113,7 @@ def draw(run, kind="speed", times=(), window="auto"):
     if rafted:
         figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right",
                     fontsize=10.5, color=style.RAFTED)
-    style.headline(figure, run, "ice field", 0.2 / size[0])
+    style.headline(figure, run, "ice field", 0.2 / size[0], kept=2 if rafted else 0)
     return figure
 
 

@@ -199,15 +199,16 @@ def legend_of(axes):
     return list(shown.values()), list(shown), [label for label in all_labels if label not in shown]
 
 
-def head(figure, words, below, left=0.02):
-    """Two lines at the head of a figure, at fixed distances from its top."""
+def head(figure, words, below, left=0.02, kept=0):
+    """Two lines at the head of a figure, at fixed distances from its top; kept: inches that the second leaves free."""
     width, height = figure.get_size_inches()
     # a letter is on average less than 0.6 of the font size wide: nothing is cut off
     size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))
     figure.text(left, 1 - 0.14 / height, words, va="top", fontsize=size, fontweight="bold")
-    figure.text(left, 1 - 0.42 / height, below, va="top", fontsize=10.5, color=FAINT)
+    small = min(10.5, 72 * (width - 0.4 - kept) / (0.52 * max(1, len(below))))
+    figure.text(left, 1 - 0.42 / height, below, va="top", fontsize=small, color=FAINT)
 
 
-def headline(figure, run, subject, left=0.02):
+def headline(figure, run, subject, left=0.02, kept=0):
     """Title and conditions at the head of a figure."""
-    head(figure, f"{title(run)}: {subject}", conditions(run), left)
+    head(figure, f"{title(run)}: {subject}", conditions(run), left, kept)
