@@ -69,19 +69,31 @@ while read -r what; do
     cat "$count"
 done <"$dir/list" >"$dir/counts"
 
-log=$dir/pytest.log
-# One more than there are cores, as they wait for disks, signals and ranks half the time; the long files first.
-${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE -n $((workers + 1)) --dist loadfile --durations=25 \
-    -m "not slow" tests/parallel tests/cli >"$log" 2>&1
-code=$?
-cat "$log"
-p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
-f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
-e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
-s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
-f=$((${f:-0} + ${e:-0}))
-if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
-echo "${p:-0} $f ${s:-0}" >>"$dir/counts"
+# tested NAME ARGUMENTS...: leaves NAME.log, and "passed failed skipped" in NAME.count
+tested() {
+    log=$dir/$1.log
+    count=$dir/$1.count
+    shift
+    ${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE --durations=25 -m "not slow" "$@" >"$log" 2>&1
+    code=$?
+    p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
+    f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
+    e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
+    s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
+    f=$((${f:-0} + ${e:-0}))
+    if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+    echo "${p:-0} $f ${s:-0}" >"$count"
+}
+# Ranks that wait for one another keep the cores busy: their tests run one by one, beside the others.
+tested ranks tests/parallel &
+# those that take longest first
+first='tests/cli/test_\(tutorials\|properties\|capability\)\.py'
+files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"; printf '%s\n' tests/cli/test_*.py | grep -v "$first")
+# shellcheck disable=SC2086 # one word a file
+tested others -n "$workers" --dist loadfile $files
+wait
+cat "$dir/ranks.log" "$dir/others.log"
+cat "$dir/ranks.count" "$dir/others.count" >>"$dir/counts"
 
 awk '{ p += $1; f += $2; s += $3 } END { printf "%d passed, %d failed, %d skipped\n", p, f, s; exit f > 0 }' \
     "$dir/counts"

@@ -5,6 +5,7 @@ A stationary Markov chain stays below z for n steps with a probability that fall
 exp(-rate(z)) is the largest eigenvalue of its transitions within (-inf, z]: found here on a grid of cells. A level is
 exceeded once in T steps, by clusters, where T rate(z) = 1.
 """
+import functools
 import sys
 from pathlib import Path
 
@@ -91,7 +92,10 @@ class UNLIKE(Chain):
         self.process, self.s, self.raised = AR1(phi), s, raised
         self.name = f"AR(1) of {phi:g} {f'+ {s:g} g' if raised else f'x exp({s:g} g)'}"
         self.bracket = (1.0, 60.0 if raised else 400.0)
-        self.logs = np.log([self.process.rate(z) for z in self.GRID])
+
+    @functools.cached_property
+    def logs(self):
+        return np.log([self.process.rate(z) for z in self.GRID])
 
     def rate(self, z):
         g = stats.norm.ppf((np.arange(20000) + 0.5) / 20000)

@@ -220,7 +220,7 @@ def start(tmp_path):
             except (OSError, KeyError):
                 return False
 
-        assert wait_for(has_frames, 30)
+        assert wait_for(has_frames, 120)
         ranks = {}
         for name in children(p.pid):
             try:
@@ -251,7 +251,7 @@ def assert_stopped_well(folder, number):
 def test_a_signal_to_one_rank_stops_all_after_the_same_step(tmp_path, start, number, rank):
     p, ranks = start()
     os.kill(ranks[rank], number)
-    out, err = p.communicate(timeout=30)
+    out, err = p.communicate(timeout=120)
     assert p.returncode == SIGNAL, err
     assert_stopped_well(tmp_path, number)
     assert err.count("bergtow: stopped by signal") == 1 and out.count("state hash") == 1
@@ -261,12 +261,12 @@ def test_mpirun_hands_on_sigusr1_and_sigusr2(tmp_path, start):
     """The first: a checkpoint, and a result that can be read, while the run goes on. The second: a stop."""
     p, _ = start()
     p.send_signal(signal.SIGUSR1)
-    assert wait_for((tmp_path / "out/checkpoint.h5").exists, 30)
+    assert wait_for((tmp_path / "out/checkpoint.h5").exists, 120)
     with h5py.File(tmp_path / "out/result.h5") as f:
         assert f.attrs["complete"] == 0 and len(f["frames/time"]) > 2
     assert p.poll() is None
     p.send_signal(signal.SIGUSR2)
-    _, err = p.communicate(timeout=30)
+    _, err = p.communicate(timeout=120)
     assert p.returncode == SIGNAL, err
     assert_stopped_well(tmp_path, signal.SIGUSR2)
 
@@ -275,7 +275,7 @@ def test_sigterm_to_mpirun(tmp_path, start):
     """mpirun gives the ranks a second, which is enough here, and has an exit code of its own."""
     p, _ = start()
     p.send_signal(signal.SIGTERM)
-    p.communicate(timeout=30)
+    p.communicate(timeout=120)
     assert p.returncode not in (DONE, None)
     assert_stopped_well(tmp_path, signal.SIGTERM)
 
@@ -284,7 +284,7 @@ def test_sigterm_to_mpirun(tmp_path, start):
 def test_a_killed_rank_ends_the_run(tmp_path, start, rank):
     p, ranks = start()
     os.kill(ranks[rank], signal.SIGKILL)
-    _, err = p.communicate(timeout=30)
+    _, err = p.communicate(timeout=120)
     assert p.returncode not in (DONE, None)
     assert f"rank {rank}" in err and "signal 9 (Killed)" in err
     assert wait_for(lambda: not any(map(lives, ranks.values())))
