@@ -84,14 +84,13 @@ tested() {
     if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
     echo "${p:-0} $f ${s:-0}" >"$count"
 }
-# Ranks that wait for one another keep the cores busy: their tests run one by one, beside the others.
-tested ranks tests/parallel &
+# Ranks that wait for one another want the cores: with other tests beside them they take ten times as long.
+tested ranks tests/parallel
 # those that take longest first
 first='tests/cli/test_\(tutorials\|properties\|capability\)\.py'
 files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"; printf '%s\n' tests/cli/test_*.py | grep -v "$first")
 # shellcheck disable=SC2086 # one word a file
 tested others -n "$workers" --dist loadfile $files
-wait
 cat "$dir/ranks.log" "$dir/others.log"
 cat "$dir/ranks.count" "$dir/others.count" >>"$dir/counts"
 
