@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Calls of the system and requests for memory that fail, at every n; the table of what comes of it is printed (-s).
 
-With ranks, and in an ensemble, a run takes seconds: there some n of each call. Nearly two hours of one core."""
+With ranks, and in an ensemble, a run takes seconds: there some n of each call. Hours of one core."""
 import collections
 
 import pytest
