@@ -79,7 +79,7 @@ def changed(base, /, **changes):
 def quick(parameters, *kept):
     """Parameters of a test, of which make test takes those that are kept; make test-long takes all."""
     parameters = list(parameters)
-    assert set(kept) <= set(parameters), kept
+    assert all(k in parameters for k in kept), kept
     slow = [pytest.param(*(p if isinstance(p, tuple) else (p, )), marks=pytest.mark.slow) for p in parameters]
     return [p if p in kept else s for p, s in zip(parameters, slow)]
 
@@ -137,6 +137,13 @@ def heard():
 def call(*arguments, cwd=None, env=None, timeout=120, **more):
     return subprocess.run([BERGTOW, *map(str, arguments)], cwd=cwd, env=env or environment(OMP_NUM_THREADS=1),
                           capture_output=True, text=True, timeout=timeout, **more)
+
+
+def script(path, *words, cwd=None, env=None, timeout=300):
+    """A call of a script of Python, one of postproc by its name alone; it starts the program that is tested."""
+    import script_copy  # not before: it loads what most tests need nothing of
+    env = (env or environment()) | {"BERGTOW": BERGTOW}
+    return script_copy.called([str(ROOT / "postproc" / path), *map(str, words)], cwd, env, timeout)
 
 
 def faulty(**what):
@@ -201,6 +208,7 @@ def differing(a, b, but=()):
     x, y = datasets(a), datasets(b)
     assert len(x) > 1, f"{a} holds next to nothing: {sorted(x)}"
     return sorted(n for n in x.keys() | y.keys() if x.get(n) != y.get(n) and n not in but)
+
 
 
 # ---- polygons, independent of the program ----

@@ -39,6 +39,7 @@ def small(tmp_path_factory):
     return out, rows
 
 
+@pytest.mark.slow
 def test_every_scene_size_and_configuration_has_a_row(small):
     out, rows = small
     machine = (out / "machine.txt").read_text()
@@ -52,6 +53,7 @@ def test_every_scene_size_and_configuration_has_a_row(small):
     assert set(bench.COLUMNS) - set(rows[0]) == {bench.PHASE_SHARE} and "detect_share" in rows[0]
 
 
+@pytest.mark.slow
 def test_rows_are_the_runs(small):
     out, rows = small
     for r in rows:
@@ -68,6 +70,7 @@ def test_rows_are_the_runs(small):
     assert all(r["state_hash"] == hashes[r["scene"], r["asked"]] for r in rows)
 
 
+@pytest.mark.slow
 def test_picture_and_machine(small):
     out, _ = small
     assert (out / "bench.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and (out / "bench.png").stat().st_size > 40000
@@ -79,6 +82,7 @@ def test_picture_and_machine(small):
         assert re.search("^" + line.replace(": ", r":\s*"), machine, re.M), (line, machine)
 
 
+@pytest.mark.slow
 def test_fields_are_made_once_and_keys_reach_the_run(small):
     out, rows = small
     before = {p: p.stat().st_mtime_ns for p in (out / "fields").iterdir()}

@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, ROOT, TOW, changed, environment, write_case
+from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -306,8 +306,7 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("budget")
     write_case(folder, BASE, "base.yml")
     write_case(folder, STUDY, "study.yml")
-    done = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--budget", "3"], cwd=folder,
-                          env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True, timeout=300)
+    done = script("budget.py", "study.yml", "-o", "out", "--budget", "3", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -367,8 +366,7 @@ def test_a_study_end_to_end(small):
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
     def with_it(row, values):
         (folder / "converge.json").write_text(json.dumps({"rows": [row], "values": values}))
-        again = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--converge", "converge.json"], cwd=folder,
-                               env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True)
+        again = script("budget.py", "study.yml", "-o", "out", "--converge", "converge.json", cwd=folder)
         assert again.returncode == 0, again.stderr
         return again.stdout, json.loads((folder / "out/budget.json").read_text())["numerics"]
     said, numerics = with_it(row, case)
@@ -384,8 +382,7 @@ def test_what_is_refused(small, tmp_path):
     def said(study, *more, out="refused"):
         write_case(tmp_path, BASE, "base.yml")
         write_case(tmp_path, study, "study.yml")
-        done = subprocess.run([BERGTOW, "budget", "study.yml", "-o", out, *more], cwd=tmp_path,
-                              env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True)
+        done = script("budget.py", "study.yml", "-o", out, *more, cwd=tmp_path)
         assert done.returncode == 4 and "Traceback" not in done.stderr
         return done.stderr
     def varied(**entry):

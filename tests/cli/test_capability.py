@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness import BERGTOW, ROOT, TOW, changed, environment, quick, run, write_case
+from harness import BERGTOW, TOW, changed, environment, quick, run, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -57,7 +57,7 @@ def test_the_evidence_is_a_fair_bet(share):
     assert crossed / 200 <= bracket.LEVEL + 2 * np.sqrt(bracket.LEVEL / 200)
 
 
-@pytest.mark.parametrize("falls", [True, False])
+@pytest.mark.parametrize("falls", quick([True, False], True))
 @pytest.mark.parametrize("scale", quick([0.001, 0.03], 0.03))
 def test_the_bracket_holds_the_limit(scale, falls):
     """Logistic chances with the limit anywhere; a steep one needs few trials and is found to the resolution."""
@@ -220,8 +220,7 @@ def test_a_stop_that_is_ordered_is_no_stop_in_the_ice(tmp_path):
 
 def found_in(folder, case, *more, code=0):
     write_case(folder, case)
-    done = subprocess.run([BERGTOW, "capability", "case.yml", "-o", "out", *map(str, more)], cwd=folder,
-                          env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True, timeout=300)
+    done = script("capability.py", "case.yml", "-o", "out", *more, cwd=folder)
     assert done.returncode == code, done.stderr
     if code:
         return done.stderr
@@ -275,7 +274,7 @@ def test_the_limit_of_concentration_against_brute_force(tmp_path):
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/capability/**/summary.json")}
 
 
-@pytest.mark.parametrize("more", [(), ("--keep-width",)])
+@pytest.mark.parametrize("more", [(), pytest.param(("--keep-width",), marks=pytest.mark.slow)])
 def test_dense_ice_gets_the_width_that_it_needs(tmp_path, more):
     """Red when a tow stops in dense ice because its periodic images are near."""
     case = changed(THRUST, domain__sides="periodic", run__duration=10, output__window_start=5)

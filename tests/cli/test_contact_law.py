@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 import resuming
-from harness import BERGTOW, CASE, DONE, ROOT, TOW, call, changed, differing, environment, launcher, write_case
+from harness import BERGTOW, CASE, DONE, ROOT, TOW, call, changed, differing, environment, launcher, script, write_case
 
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
 FENDER = {"load": "8 N", "stiffness": "300 N/m"}
@@ -97,7 +97,7 @@ def test_same_bits_in_every_layout_and_after_a_stop(tmp_path, case, layouts):
 
 def test_the_page_of_the_run_names_its_keys(tmp_path):
     folder, *_ = of_run(tmp_path, changed(SPEED, run__duration=12))
-    done = subprocess.run(["/usr/bin/python3", ROOT / "postproc/report.py", folder], capture_output=True, text=True)
+    done = script("report.py", folder)
     assert done.returncode == 0, done.stderr
     page = (folder / "report.html").read_text()
     assert "fender.load" in page

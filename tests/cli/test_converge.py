@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """postproc/converge.py: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
 import json
-import os
 import subprocess
 import sys
 import time
@@ -12,8 +11,7 @@ import numpy as np
 import pytest
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, ROOT, TOW, changed, environment, write_case
-from test_postproc import script
+from harness import BERGTOW, TOW, changed, environment, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -73,8 +71,7 @@ CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20
 
 def converged(folder, case, *more):
     write_case(folder, case)
-    result = subprocess.run([BERGTOW, "converge", "case.yml", "-o", "out", *map(str, more)], cwd=folder,
-                            env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True, timeout=300)
+    result = script("converge.py", "case.yml", "-o", "out", *more, cwd=folder)
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "out/converge.json").read_text()), result.stdout
 
@@ -139,8 +136,7 @@ def test_runs_are_kept_and_a_spent_budget_is_reported(tmp_path):
 def test_what_is_refused(tmp_path):
     write_case(tmp_path, CASE)
     def said(*arguments):
-        return subprocess.run([sys.executable, ROOT / "postproc/converge.py", *arguments], cwd=tmp_path,
-                              env=os.environ | {"BERGTOW": str(BERGTOW)}, capture_output=True, text=True)
+        return script("converge.py", *arguments, cwd=tmp_path)
     assert said("none.yml").returncode == 4 and "no such file" in said("none.yml").stderr
     assert said("case.yml", "--vary", "colour").returncode == 2 and said("case.yml", "--budget", "0").returncode == 2
     bad = said("case.yml", "--set", "ice.sise=1")

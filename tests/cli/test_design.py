@@ -13,7 +13,7 @@ import yaml
 
 import made_up_ensemble as made_up
 from browser import browser, complaints, opened
-from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
+from harness import BERGTOW, ROOT, TOW, call, changed, environment, script, write_case
 
 sys.path.insert(0, str(ROOT / "postproc"))
 
@@ -98,7 +98,8 @@ PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration
 
 
 @pytest.mark.parametrize("case, more, wider", [
-    (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}), (PERIODIC, ("--keep-width",), None),
+    (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}), 
+    pytest.param(PERIODIC, ("--keep-width",), None, marks=pytest.mark.slow),
     pytest.param(PERIODIC, ("--set", "domain.width=6 m"), None, marks=pytest.mark.slow),
     pytest.param(changed(PERIODIC, domain__y0=-2.5), (), None, marks=pytest.mark.slow),
     pytest.param(PERIODIC, ("--set", "domain.sides=wall"), None, marks=pytest.mark.slow)
@@ -199,8 +200,7 @@ def test_levels_have_the_digits_that_they_are_worth():
 
 def test_what_is_refused(made, tmp_path, monkeypatch):
     def said(*arguments, **more):
-        return subprocess.run([BERGTOW, "design", *map(str, arguments)], cwd=tmp_path, capture_output=True, text=True,
-                              env=environment(BERGTOW_HOME=ROOT, **more), timeout=120)
+        return script("design.py", *arguments, cwd=tmp_path, env=environment(**more))
     write_case(tmp_path, CASE)
     assert said("none.yml").returncode == 4 and said("case.yml", "--concentrations", "0.99").returncode == 2
     other = said("case.yml", "--also", ".", "-o", "none")

@@ -50,7 +50,7 @@ def run(folder, path, ranks, *more):
 
 
 @pytest.mark.parametrize("name, ranks", quick([(name, ranks) for name in CASES for ranks in (1, 2)],
-                                              *((name, 1) for name in CASES), ("dense", 2), ("two checkpoints", 2)))
+                                              *((name, 1) for name in list(CASES)[1::2]), ("dense", 2)))
 def test_what_is_left(tmp_path, name, ranks):
     path = write_case(tmp_path, CASES[name])
     text = call("check", path).stdout

@@ -7,12 +7,11 @@ import itertools
 import json
 import re
 import shlex
-import subprocess
-import sys
 
 import pytest
 
-from harness import DONE, ROOT, call, environment
+import harness
+from harness import DONE, ROOT, call
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
@@ -118,8 +117,7 @@ def script(name, beside):
 @functools.cache
 def of_script(path, *words):
     """A script called with these words."""
-    return subprocess.run([sys.executable, path, *words], capture_output=True, text=True, cwd=ROOT, timeout=60,
-                          env=environment(MPLBACKEND="agg"))
+    return harness.script(path, *words, cwd=ROOT)
 
 
 @functools.cache

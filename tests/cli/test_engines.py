@@ -88,6 +88,7 @@ def test_a_worker_that_dies_costs_nothing(client, tmp_path):
     assert differing(tmp_path / "alone/ensemble.h5", out / "ensemble.h5") == []
 
 
+@pytest.mark.slow
 def test_ctrl_c_reaches_the_workers(tmp_path):
     path, out = study(tmp_path, 50), tmp_path / "out"
     script = f"""

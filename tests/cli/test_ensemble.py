@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from harness import (BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, heard, launcher,
-                     write_case)
+                     quick, write_case)
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
@@ -129,7 +129,7 @@ def test_a_reader_that_has_gone(quiet, tmp_path):
     assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", quick([signal.SIGINT, signal.SIGHUP], signal.SIGINT))
 def test_interrupted(quiet, tmp_path, number):
     folder, _ = quiet
     prepare(tmp_path)

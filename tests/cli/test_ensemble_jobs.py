@@ -74,6 +74,7 @@ def test_jobs_make_the_file_of_one(folder):
     assert shares(one)[0] == 1 and shares(three)[0] == 3
 
 
+@pytest.mark.slow
 def test_the_cores_are_shared_by_what_members_keep_busy(folder):
     """Small fields have a thread each; where somebody has asked for threads there is one process, as ever."""
     cores = len(os.sched_getaffinity(0))

@@ -8,7 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, SIGNAL, TOW, USAGE, call, changed, differing, environment, launcher, write_case
+from harness import (BERGTOW, CASE, DONE, SIGNAL, TOW, USAGE, call, changed, differing, environment, launcher, quick,
+                     write_case)
 from test_ensemble import BASE, STUDY, ensemble, journal, prepare
 
 LONG = changed(TOW, run__duration=3000, output__window_start=5, domain__length=500)
@@ -67,7 +68,7 @@ def test_the_disk_of_members_without_frames(tmp_path):
     assert disk(STUDY) < 0.8 * disk(STUDY | {"set": {"output.frame_interval": 0.1}})
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", quick([1, 2], 1))
 def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
     """200 steps a member, in calls of 80: two leave all of them, the third ends them, with the same file."""
     prepare(tmp_path)
@@ -111,6 +112,7 @@ def test_a_limit_of_wall_time_leaves_whole_fields(quiet, tmp_path):
     assert [c for c, _ in costly] != [c for c, _ in fields] and costly[0][0] == costly[1][0] == costly[2][0]
 
 
+@pytest.mark.slow
 def test_a_limit_of_wall_time_leaves_a_fair_sample_of_a_hypercube(tmp_path):
     """Whatever its conditions cost: where the time ends, the costly ones alone would have another mean. Without a limit
     nothing is left out, and the costly ones come first."""

@@ -7,6 +7,7 @@ import pytest
 
 import faults
 from faults import SCENARIOS, chosen, not_durable
+from harness import quick
 
 # runs of each scenario; with ranks, and with three members, each takes seconds
 MOST = {"run": 12, "resume": 10, "run --force": 12, "field": 6, "field to GeoJSON": 6, "run --dump-contacts": 6,
@@ -27,7 +28,7 @@ def scenarios(tmp_path_factory):
     return get
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", quick(SCENARIOS, "run", "resume", "run --force", "field", "ensemble", "2 ranks"))
 def test_nothing_is_lost(scenarios, name):
     scenario, calls = scenarios(name)
     wrong = []
@@ -39,7 +40,7 @@ def test_nothing_is_lost(scenarios, name):
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("name", ["run", "resume", "run --force", "field", "run --dump-contacts"])
+@pytest.mark.parametrize("name", ["run", "run --force", "field"])
 def test_no_memory(scenarios, name):
     """Refused at some requests of the program's own code."""
     scenario, _ = scenarios(name)

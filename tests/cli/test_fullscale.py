@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: MIT
 """cases/fullscale/study.py on a small piece of ice: the table, what is kept and what is run again, and its exit
 codes."""
-import subprocess
-import sys
 
 import pytest
 
-from harness import BERGTOW, CASE, DONE, ROOT, USAGE, call, environment
+from harness import CASE, DONE, ROOT, USAGE, call, script
 
 STUDY = ROOT / "cases/fullscale/study.py"
 SMALL = ("--set", "domain.length=900 m", "--set", "domain.width=500 m", "--set", "body.x=-300 m", "--set",
@@ -15,11 +13,7 @@ SMALL = ("--set", "domain.length=900 m", "--set", "domain.width=500 m", "--set",
 
 
 def study(*arguments):
-    return subprocess.run([sys.executable, str(STUDY), *map(str, arguments)],
-                          capture_output=True,
-                          text=True,
-                          timeout=120,
-                          env=environment(BERGTOW=BERGTOW))
+    return script(STUDY, *arguments)
 
 
 def test_the_base_case_is_what_the_readme_says():

@@ -3,7 +3,6 @@
 down again here."""
 import json
 import re
-import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, write_case
+from harness import CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, script, write_case
 from resuming import assert_same_result, done, killed_after
 
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -293,11 +292,10 @@ def test_the_picture_shows_what_the_file_holds(line, tmp_path):
         late = np.sort(hits["peak"][hits["time"] >= 10])[::-1]
         assert np.array_equal(curve.get_xdata(), late)
         np.testing.assert_allclose(curve.get_ydata(), np.arange(1, len(late) + 1) / line.summary["impacts"]["hours"])
-    script = [sys.executable, ROOT / "postproc/plot_impacts.py"]
-    assert subprocess.run([*script, line.dir, "-o", tmp_path / "a.png"
-                           ]).returncode == 0 and (tmp_path / "a.png").stat().st_size > 20000
+    done = script("plot_impacts.py", line.dir, "-o", tmp_path / "a.png")
+    assert done.returncode == DONE and (tmp_path / "a.png").stat().st_size > 20000
     none = run(tmp_path, changed(TOW, run__duration=0.2, impact={"conversion": "none"}))
-    refused = subprocess.run([*script, none.dir], capture_output=True, text=True)
+    refused = script("plot_impacts.py", none.dir)
     assert refused.returncode == IO and "impact.conversion" in refused.stderr and "Traceback" not in refused.stderr
     quiet = run(tmp_path, changed(TOW, ice__concentration=0, run__duration=0.2), name="quiet")
-    assert subprocess.run([*script, quiet.dir]).returncode == 0  # nothing met: still a picture
+    assert script("plot_impacts.py", quiet.dir).returncode == DONE  # nothing met: still a picture

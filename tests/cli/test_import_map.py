@@ -640,6 +640,7 @@ def test_from_python(tmp_path):
 # ---- the page
 
 
+@pytest.mark.slow
 def test_the_how_to(tmp_path):
     """From a labelled mosaic to a run, word for word; what is synthetic says so to the end."""
     reader = tutorial.follow("../ice-from-an-image.md", tmp_path)

@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, TOW, call, changed, write_case
-from test_postproc import script
+from harness import BERGTOW, TOW, call, changed, script, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))

@@ -13,8 +13,8 @@ import pytest
 from scipy import stats
 
 import made_up_ensemble as made_up
+from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
-from test_postproc import script
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -148,7 +148,8 @@ def test_the_return_time_of_a_design_value():
 
 # ---- extremes of known processes
 
-@pytest.mark.parametrize("process, fields, n", [(AR1(0.9), 12, 2000), (EAR1(0.7), 20, 480),
+@pytest.mark.parametrize("process, fields, n", [pytest.param(AR1(0.9), 12, 2000, marks=pytest.mark.slow),
+                                                pytest.param(EAR1(0.7), 20, 480, marks=pytest.mark.slow),
                                                 (EAR1(0.0), 8, 600), (POISSON(0.02), 8, 4000)],
                          ids=lambda v: getattr(v, "name", None))
 def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):

@@ -6,8 +6,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from harness import DONE, call, changed, write_case
-from test_postproc import done, make_run, pixels, script, where
+from harness import DONE, call, changed, script, write_case
+from test_postproc import done, make_run, pixels, where
 
 import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
 import style  # noqa: E402

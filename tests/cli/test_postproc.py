@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from harness import script
+
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
 
@@ -112,13 +114,6 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
                "warnings": ["first doubt", "second doubt", "third doubt"]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return folder
-
-
-def script(name, *arguments):
-    return subprocess.run(["/usr/bin/python3", str(POSTPROC / name), *map(str, arguments)],
-                          capture_output=True,
-                          text=True,
-                          timeout=120)
 
 
 def done(result, *paths):

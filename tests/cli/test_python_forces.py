@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from harness import changed, run
+from harness import changed, quick, run
 from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, python, stepped
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -47,7 +47,7 @@ a.end()
     return datasets_of(folder / "result.h5"), bergtow.Result(folder).summary["state_hash"]
 
 
-@pytest.mark.parametrize("case", [SHORT, LINE], ids=["speed", "line"])
+@pytest.mark.parametrize("case", quick([SHORT, LINE], LINE), ids=["speed", "line"])
 def test_a_force_that_comes_later_leaves_a_run_alone(case, tmp_path):
     alone, state = beside_a_late_force(case, tmp_path / "alone", late=False)
     beside, same = beside_a_late_force(case, tmp_path / "beside", late=True)

@@ -312,6 +312,7 @@ def test_everything_public_has_types_and_a_text():
                 assert {*parameters, "return"} <= set(function.__annotations__), (name, own)
 
 
+@pytest.mark.slow
 def test_pip_installs_the_package_as_the_page_says(tmp_path):
     there = installed_by_pip(tmp_path)
     code = "import bergtow as b; print(b.__file__, b.Case({'run': {'dt': 0.1, 'duration': 1}})['run.dt'])"

@@ -8,7 +8,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from harness import ROOT, TOW, call, changed, environment, run, write_case
+from harness import ROOT, TOW, call, changed, environment, run, script, write_case
 from python_package import bergtow, installed_by_pip
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -31,14 +31,15 @@ def speeds(tmp_path_factory):
     return folder / "out"
 
 
-def drawn_by(script, *arguments):
-    subprocess.run([sys.executable, ROOT / f"postproc/{script}", *arguments], check=True, capture_output=True)
+def drawn_by(name, *arguments):
+    done = script(name, *arguments)
+    assert done.returncode == 0, done.stderr
 
 
 # --- of a run ---------------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("name, words, options", [
-    ("force", [], {}),
+    pytest.param("force", [], {}, marks=pytest.mark.slow),
     ("force", ["--max", "50"], {"max": 50}),
     ("field", ["--colour", "force", "--times", "1", "3"], {"colour": "force", "times": [1, 3]}),
     ("impacts", [], {}),

@@ -26,7 +26,8 @@ import numpy as np
 import pytest
 
 import resuming
-from harness import BERGTOW, DONE, ROOT, TOW, call, changed, differing, environment, launcher, machine_keys, write_case
+from harness import (BERGTOW, DONE, ROOT, TOW, call, changed, differing, environment, launcher, machine_keys, quick,
+                     script, write_case)
 
 sys.path.insert(0, str(ROOT / "postproc"))
 
@@ -239,9 +240,7 @@ def test_every_number_of_a_member_is_in_the_ensemble(ensemble):
 
 
 def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_path):
-    done = subprocess.run(["/usr/bin/python3", ROOT / "postproc/ensemble.py", ensemble, "--resamples", "50"],
-                          capture_output=True,
-                          text=True)
+    done = script("ensemble.py", ensemble, "--resamples", 50)
     assert done.returncode == 0, done.stderr
     assert "energy of the strip" in done.stdout
     e = Ensemble(ensemble)
@@ -306,7 +305,7 @@ def test_the_examples_are_what_they_say(tmp_path):
                                                                            said) and "energy of the strip" in said
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, "line", "window"))
 def test_everything_survives_stop_and_resume(tmp_path, name):
     """Samples of three steps, stopped within one; resumed on other ranks than the whole run has."""
     case = changed(CASES[name][0], output__sample_every=3)
@@ -319,6 +318,7 @@ def test_everything_survives_stop_and_resume(tmp_path, name):
     assert {k for k in one if one[k] != other.get(k)} <= machine_keys() and one.keys() == other.keys()
 
 
+@pytest.mark.slow
 def test_everything_survives_a_kill(tmp_path):
     """kill -9 as soon as there is a checkpoint, and again after each resume, until the run has come to its end."""
     case = changed(resuming.CASE, output__checkpoint_steps=8)

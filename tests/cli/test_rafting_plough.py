@@ -16,7 +16,7 @@ set in motion, which is below 1 % here.
 import numpy as np
 import pytest
 
-from harness import run
+from harness import quick, run
 
 V, L, B, H, KAPPA, FLOES, DT = 0.02, 3.0, 1.0, 0.1, 5, 12, 0.25
 RHO_W, RHO_I, G, SKIN = 1000.0, 900.0, 9.81, 5.0
@@ -52,7 +52,7 @@ def expected(gap):
     return out
 
 
-@pytest.mark.parametrize("concentration", [0.75, 0.6])
+@pytest.mark.parametrize("concentration", quick([0.75, 0.6], 0.75))
 def test_front_and_load(tmp_path, concentration):
     gap = L * (1 - concentration) / concentration
     r = run(tmp_path, case(gap))

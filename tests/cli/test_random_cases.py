@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random cases (random_cases.py): a dozen, 50 steps each, on the build with sanitizers where it is there; thousands
+"""Random cases (random_cases.py): eight, 50 steps each, on the build with sanitizers where it is there; thousands
 in tests/long."""
 import collections
 import json
@@ -14,7 +14,7 @@ from harness import BERGTOW, ROOT, USAGE, call
 
 ASAN = ROOT / "build/asan/bergtow"
 PROGRAM = ASAN if ASAN.exists() else pathlib.Path(BERGTOW)
-SEEDS = 12
+SEEDS = 8
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import shutil
-import subprocess
 import sys
 import zlib
 from pathlib import Path
@@ -17,6 +16,7 @@ from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.support.ui import Select
 
 from browser import browser, complaints, opened, until
+import harness
 from harness import TOW, call, changed, run, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
@@ -60,10 +60,7 @@ RAFTS = changed(TOW,
 
 
 def script(*arguments):
-    return subprocess.run(["/usr/bin/python3", str(POSTPROC / "report.py"), *map(str, arguments)],
-                          capture_output=True,
-                          text=True,
-                          timeout=120)
+    return harness.script("report.py", *arguments)
 
 
 def page_without_pictures(folder, path, monkeypatch, *arguments):

@@ -14,8 +14,8 @@ import pytest
 from scipy import stats
 
 import made_up_ensemble as made_up
-from harness import DONE, TOW, call, changed, run, write_case
-from test_postproc import done, pixels, script
+from harness import DONE, TOW, call, changed, run, script, write_case
+from test_postproc import done, pixels
 
 import ensemble  # noqa: E402  (test_postproc has put postproc/ on the path)
 import plot_chains  # noqa: E402

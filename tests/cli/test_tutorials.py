@@ -43,6 +43,7 @@ def test_all_are_followed():
     assert PAGES == sorted(AFTER)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_tutorial(name, tmp_path):
     AFTER[name](tutorial.follow(name, tmp_path))

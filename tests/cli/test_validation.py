@@ -174,6 +174,7 @@ def test_the_length_scale_of_made_up_loads_is_found_again(monkeypatch):
     assert barrier.exponents(found)[0] == pytest.approx([1, -1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_walls_carry_part_of_the_cover(done):
     """In 2 m of width: without friction the barrier bears the whole drag; with it less, and the less the longer the
     cover; twice the friction halves the length scale."""

@@ -11,7 +11,7 @@ import subprocess
 import pytest
 
 import scenes
-from harness import BERGTOW, DONE
+from harness import BERGTOW, DONE, quick
 
 RECORDED_WITH, STORED = scenes.stored()
 
@@ -21,12 +21,13 @@ LEFT_OUT = {
 }
 
 
-@pytest.mark.parametrize("name", scenes.SCENES)
-def test_scene_is_what_it_was(tmp_path, name):
-    first, second = scenes.layouts_of(name)
-    items = scenes.run_scene(tmp_path / "first", name, first)
-    other = scenes.run_scene(tmp_path / "second", name, second)
-    assert scenes.differing(items, other) == [], f"{first} and {second}, as (ranks, threads) of each leg, differ"
+# make test has one of the two layouts of each scene: what both must leave is stored
+LAYOUTS = [(name, k) for name in scenes.SCENES for k in (0, 1)]
+
+
+@pytest.mark.parametrize("name, layout", quick(LAYOUTS, *((name, k % 2) for k, name in enumerate(scenes.SCENES))))
+def test_scene_is_what_it_was(tmp_path, name, layout):
+    items = scenes.run_scene(tmp_path, name, scenes.layouts_of(name)[layout])
     assert name in STORED, f"nothing stored: tests/scenes.py --record {name}"
     want, found = STORED[name], scenes.digests(items)
     gone, moved = sorted(want.keys() - found.keys()), sorted(i for i in want if i in found and want[i] != found[i])
