@@ -24,13 +24,15 @@ MPIRUN = shlex.split(os.environ.get("MPIRUN", "mpirun --oversubscribe"))
 RANK = "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"  # in a shell that the launcher starts
 DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
-# A tow through loose ice, some 140 floes, done in a fraction of a second.
+# A tow through loose ice, some 140 floes, done in a fraction of a second; the 200 frames that a run has unless it says
+# otherwise would take most of it.
 TOW = {
     "run": {"dt": 0.1, "duration": 30},
     "domain": {"length": 15, "width": 8},
     "ice": {"concentration": 0.5, "size": 0.7, "thickness": 0.04, "friction": 0.3},
     "body": {"x": 3, "length": 2, "draft": 0.5},
     "tow": {"speed": 0.13, "ramp": 2},
+    "output": {"frame_interval": 3},
 }
 # Walls that close on dense ice: thousands of contacts at once, so that every loop that may run in parallel does.
 PRESS = {

@@ -20,6 +20,7 @@ WINDOW = {
     "ice": {"concentration": 0.5, "size": 1.2, "thickness": 0.04, "friction": 0.3},
     "body": {"length": 2, "draft": 0.5}, "tow": {"speed": 0.8, "ramp": 1},
     "water": {"latitude": 75, "tide": {"major": 0.2, "minor": 0.05, "period": 12}}, "air": {"wind_x": 5},
+    "output": {"frame_interval": 1},
 }
 
 

@@ -41,8 +41,8 @@ PATIENCE = 180
 PROVENANCE = {"version", "ranks", "threads", "command_line", "compiler", "flags", "host", "libraries", "revision",
               "start_time", "wall_time"}
 
-SHORT = changed(TOW, run__duration=4)
-DENSE = changed(TOW, run__duration=4, ice__concentration=0.75, ice__size=0.9)
+SHORT = changed(TOW, run__duration=4, output=None)
+DENSE = changed(TOW, run__duration=4, output=None, ice__concentration=0.75, ice__size=0.9)
 LINE = changed(SHORT, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4)
 SHIP = {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 2}
 GEO = {

@@ -439,6 +439,7 @@ DRIFT = {
     "body": {"shape": "disc", "length": 100, "draft": 50, "sail": 7},
     "tow": {"mode": "none"},
     "floes": [{"shape": "disc", "length": 40, "x": 300, "y": 300}],
+    "output": {"frame_interval": 10000},
 }
 
 

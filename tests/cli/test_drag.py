@@ -16,6 +16,7 @@ TURNING = {
     "ice": {"concentration": 0},
     "body": {"shape": "rectangle", "length": 80, "width": 56, "draft": 58, "yaw_rate": 0.3},
     "tow": {"mode": "none"},
+    "output": {"frame_interval": 600},
 }
 RECTANGLE = np.array([[-40, -28], [40, -28], [40, 28], [-40, 28]], float)
 

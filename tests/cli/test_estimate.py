@@ -256,7 +256,7 @@ DRIVEN = {
     "body": {"shape": "disc", "length": 40, "draft": 30},
     "tow": {"speed": 0.4, "ramp": 20},
     "air": {"wind_x": 12},
-    "output": {"window_start": 100},
+    "output": {"window_start": 100, "frame_interval": 100},
 }
 
 

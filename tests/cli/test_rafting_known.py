@@ -37,7 +37,7 @@ def pushed(tmp_path, n, s):
         "body": {"shape": "rectangle", "length": body, "width": A, "x": 1 + 0.5 * body, "draft": 1, "friction": 0},
         "tow": {"speed": V, "ramp": 0},
         "water": {"density": RHO_W},
-        "output": {"window_start": 0},
+        "output": {"window_start": 0, "frame_interval": s / V},
         "solver": {"tolerance": 1e-7, "max_sweeps": 20000},
     })
     assert r.summary["unconverged_steps"] == 0

@@ -23,6 +23,7 @@ CLUSTER = {
     "ice": {"concentration": 0.75, "size": 1, "friction": 0.2, "thickness_law": "lognormal", "rafting": {"kappa": 6}},
     "body": {"shape": "none"},
     "solver": {"tolerance": TOLERANCE, "max_sweeps": 1000000},
+    "output": {"frame_interval": 30},
 }
 
 

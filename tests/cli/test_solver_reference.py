@@ -23,6 +23,7 @@ BASE = {
     "ice": {"concentration": 0.85, "size": 0.8, "friction": 0, "seed": 2},
     "body": {"shape": "none"},
     "solver": {"tolerance": TOLERANCE, "max_sweeps": 100000},
+    "output": {"frame_interval": 4},
 }
 TOWED = {"shape": "square", "length": 1.5, "x": 3, "y": 0.2, "yaw": 12}
 CASES = {

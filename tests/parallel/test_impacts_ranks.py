@@ -28,7 +28,7 @@ def one(request, tmp_path_factory):
     return folder, run(folder, CASES[request.param], "--threads", 1)
 
 
-@pytest.mark.parametrize("ranks, threads", quick([(1, 3), (2, 1), (3, 2)], (1, 3), (3, 2)))
+@pytest.mark.parametrize("ranks, threads", quick([(1, 3), (2, 1), (3, 2)], (3, 2)))
 def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     folder, alone = one
     result = subprocess.run([

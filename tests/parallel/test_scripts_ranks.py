@@ -21,6 +21,7 @@ def test_two_ranks_are_refused(tmp_path, command):
     assert [p.name for p in tmp_path.iterdir()] == ["case.yml"]
 
 
+@pytest.mark.slow
 def test_a_study_on_one_rank_is_that_without_mpirun(tmp_path):
     """What the script starts does not take itself for the rank that it was started by."""
     write_case(tmp_path, CASE)
