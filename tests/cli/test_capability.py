@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness import BERGTOW, TOW, changed, environment, quick, run, script, write_case
+from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -57,8 +57,9 @@ def test_the_evidence_is_a_fair_bet(share):
     assert crossed / 200 <= bracket.LEVEL + 2 * np.sqrt(bracket.LEVEL / 200)
 
 
-@pytest.mark.parametrize("falls", quick([True, False], True))
-@pytest.mark.parametrize("scale", quick([0.001, 0.03], 0.03))
+@pytest.mark.slow
+@pytest.mark.parametrize("falls", [True, False])
+@pytest.mark.parametrize("scale", [0.001, 0.03])
 def test_the_bracket_holds_the_limit(scale, falls):
     """Logistic chances with the limit anywhere; a steep one needs few trials and is found to the resolution."""
     rng, missed, trials, errors = np.random.default_rng(3), 0, [], []

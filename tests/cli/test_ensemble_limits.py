@@ -28,6 +28,7 @@ def frames(path):
         return len(f["frames/time"])
 
 
+@pytest.mark.slow
 def test_members_write_no_frames_unless_the_study_asks(quiet, tmp_path):
     member = quiet / "all/members/c001-r001"
     assert frames(member / "result.h5") == 0 and "frame_interval: -1 s" in (member / "case.resolved.yml").read_text()

@@ -90,6 +90,7 @@ def test_free_drift_is_the_balance_of_forces(tmp_path, frame, tilt, latitude):
         assert speed[-1, 0] == pytest.approx(np.hypot(*want), rel=close)
 
 
+@pytest.mark.slow
 def test_a_pack_drifts_as_its_floes_do(tmp_path):
     """Without form drag every floe of one thickness has the same free drift, whatever its size and place: a dense pack
     moves as one and its floes do not press on each other."""

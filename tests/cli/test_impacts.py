@@ -125,6 +125,7 @@ def test_everything_is_counted_over_the_window_that_is_found(found):
     assert f"{s['collisions_whole_run'] - s['collisions']} before the window" in found.result.stdout
 
 
+@pytest.mark.slow
 def test_a_long_run_that_was_killed_counts_the_same(tmp_path):
     """More steps than blocks of five hold: killed before the window, and within it."""
     case = changed(FOUND,

@@ -14,7 +14,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, DONE, ROOT, TOW, Run, call, changed, differing, environment, run, write_case
+from harness import BERGTOW, DONE, ROOT, TOW, Run, call, changed, differing, environment, quick, run, write_case
 
 EXAMPLES = ROOT / "tests/examples"
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
@@ -141,7 +141,7 @@ def test_the_library_exports_what_public_headers_name(prefix):
     assert {"bt_on_out_of_memory", "bt_comm_start", "bt_force_apply", "bt_quantity_register"} <= exported
 
 
-@pytest.mark.parametrize("compiler", ["gcc -std=c17", "g++ -std=c++17"])
+@pytest.mark.parametrize("compiler", quick(["gcc -std=c17", "g++ -std=c++17"], "gcc -std=c17"))
 def test_each_header_stands_alone(prefix, tmp_path, compiler):
     names = sorted(h.name for h in (prefix / "include/bergtow").glob("*.h"))
     assert "simulation.h" in names and len(names) > 20
@@ -335,6 +335,7 @@ def test_installed_commands_find_their_scripts(prefix, tmp_path):
     assert result.returncode == 0 and "CASE.yml" in result.stdout
 
 
+@pytest.mark.slow
 def test_uninstall_leaves_what_is_not_ours(tmp_path):
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib/other.txt").write_text("not ours\n")
@@ -371,6 +372,7 @@ def test_the_link_of_the_debian_package_is_to_the_python_package(tmp_path):
     assert library_of(link.parent) == f"{tmp_path}/usr/lib/libbergtow.so.0"
 
 
+@pytest.mark.slow
 def test_destdir_is_no_part_of_what_is_installed(tmp_path):
     make("install", "PREFIX=/usr", f"DESTDIR={tmp_path}")
     assert str(tmp_path) not in (tmp_path / "usr/lib/pkgconfig/bergtow.pc").read_text()

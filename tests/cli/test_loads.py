@@ -422,6 +422,7 @@ def test_members_of_an_earlier_program_say_it_in_their_warnings(tmp_path):
         assert statement_module.unbounded(e, c.finished) == (k == 1)
 
 
+@pytest.mark.slow
 def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_path):
     """By its moving mean, and with its cause where it comes while the ramp lasts; not where it takes less."""
     folder, text, s = statement

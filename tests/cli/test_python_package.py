@@ -150,7 +150,7 @@ def test_a_large_result_opens_without_being_read(tmp_path):
     __import__("xarray")  # which is not timed
     start = time.process_time()  # of this process alone, on a busy machine, too
     with bergtow.open_result(there.dir) as d:
-        assert d.floe_x.shape == (t, n) and float(d.floe_x[7, 5]) == 0
+        assert d.floe_x.shape == (t, n) and float(d.floe_x[2, 5]) == 0
         assert time.process_time() - start < 1
 
 
@@ -233,6 +233,7 @@ def test_ctrl_c_stops_an_ensemble_that_goes_on(tmp_path):
     assert bergtow.Ensemble(tmp_path / "out").counts["finished"] < 4
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
     shutil.copy(ROOT / "cases/basin/basin-80.yml", tmp_path)
     monkeypatch.chdir(tmp_path)

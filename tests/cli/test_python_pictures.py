@@ -117,6 +117,7 @@ def test_progress(tmp_path, capsys):
 
 # --- of an ensemble ---------------------------------------------------------------------------------------------------
 
+@pytest.mark.slow
 def test_statistics_of_an_ensemble(speeds, tmp_path):
     found = bergtow.Ensemble(speeds).statistics(resamples=99, time_scale=1)
     drawn_by("ensemble.py", speeds, "-o", tmp_path, "--resamples", "99", "--time-scale", "1")
@@ -136,6 +137,7 @@ def test_pictures_of_an_ensemble(speeds, tmp_path):
 
 # --- reports ----------------------------------------------------------------------------------------------------------
 
+@pytest.mark.slow
 def test_reports(towed, speeds, tmp_path):
     path = bergtow.Result(towed).report(tmp_path / "run.html", client="Nordic & Sons")
     assert "Nordic &amp; Sons" in path.read_text()
@@ -159,6 +161,7 @@ def test_the_wheel_has_the_command(towed, tmp_path):
     assert said.returncode == 4 and said.stderr.startswith("bergtow-report: ") and "Traceback" not in said.stderr
 
 
+@pytest.mark.slow
 def test_make_install_has_the_command(towed, tmp_path):
     own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     made = subprocess.run(["make", "--no-print-directory", "install", f"PREFIX={tmp_path / 'usr'}"], cwd=ROOT,

@@ -35,6 +35,7 @@ from bergtow_read import Run  # noqa: E402
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
 OLD = f"an old page, {command.MARK}"
 CASE = changed(TOW,
+               output=None,
                run__title=HOSTILE,
                ice__concentration=0.7,
                reference__mean_force=3.0,

@@ -198,6 +198,7 @@ def test_page_stands_alone_and_text_stays_text(page):
     assert page.execute_script("return document.documentElement.scrollWidth") <= 380
 
 
+@pytest.mark.slow
 def test_members_of_other_builds_and_lost_folders_are_reported(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"

@@ -108,6 +108,7 @@ def test_the_stop_file(whole):
     assert_same_result(one.dir, folder / "stopped")
 
 
+@pytest.mark.slow
 def test_the_wall_time(whole):
     folder, one = whole
     result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.2", cwd=folder)

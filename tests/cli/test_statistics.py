@@ -66,6 +66,7 @@ def plain(tmp_path_factory):
     return folder, result, json.loads((folder / "statistics.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
     """Each member's own change is within its noise; over eight fields it is not."""
     def change(c, r):
@@ -402,6 +403,7 @@ def test_negative_values_are_in_the_picture(tmp_path):
     matplotlib.pyplot.close("all")
 
 
+@pytest.mark.slow
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
     result = script("plot_ensemble.py", plain[0], "-o", tmp_path)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Calls of the system and requests for memory that fail, at every n; the table of what comes of it is printed (-s).
 
-Where a run is one of another scenario with more around it, with ranks, and in an ensemble: at some n of each call. Hours
-of one core."""
+Where a run is one of another scenario with more around it, with ranks, and in an ensemble: at some n of each call.
+Hours of one core."""
 import collections
 
 import pytest
