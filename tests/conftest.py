@@ -10,8 +10,16 @@ import pytest
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "slow: not in make test, but in make test-long")
+    config.addinivalue_line("markers", "one_rank: in parallel/, and of a single process")
+    config.addinivalue_line("markers", "ranks: all others of parallel/, which make test runs with nothing beside them")
     if not os.access(harness.BERGTOW, os.X_OK):
         raise pytest.UsageError(f"{harness.BERGTOW}: no such program; build it with make, or name it in BERGTOW")
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.path.parent.name == "parallel" and not item.get_closest_marker("one_rank"):
+            item.add_marker("ranks")
 
 
 @pytest.fixture(scope="session")

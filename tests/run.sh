@@ -69,12 +69,13 @@ while read -r what; do
     cat "$count"
 done <"$dir/list" >"$dir/counts"
 
-# tested NAME ARGUMENTS...: leaves NAME.log, and "passed failed skipped" in NAME.count
+# tested NAME MARKERS ARGUMENTS...: leaves NAME.log, and "passed failed skipped" in NAME.count
 tested() {
     log=$dir/$1.log
     count=$dir/$1.count
-    shift
-    ${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE --durations=25 -m "not slow" "$@" >"$log" 2>&1
+    markers="not slow and $2"
+    shift 2
+    ${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE --durations=25 -m "$markers" "$@" >"$log" 2>&1
     code=$?
     p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
     f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
@@ -85,13 +86,14 @@ tested() {
     echo "${p:-0} $f ${s:-0}" >"$count"
 }
 # Ranks that wait for one another want the cores: with other tests beside them they take ten times as long.
-tested ranks tests/parallel
+tested ranks ranks tests/parallel
 # those that take longest first
-first='tests/cli/test_\(tutorials\|properties\|capability\)\.py'
-files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"; printf '%s\n' tests/cli/test_*.py | grep -v "$first")
+first='tests/cli/test_\(properties\|random_cases\|design\)\.py'
+files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"
+    printf '%s\n' tests/parallel tests/cli/test_*.py | grep -v "$first")
 # one more than there are cores: what waits for a signal, a lock or a limit of time leaves a core to others
 # shellcheck disable=SC2086 # one word a file
-tested others -n $((workers + 1)) --dist loadfile $files
+tested others "not ranks" -n $((workers + 1)) --dist loadfile $files
 cat "$dir/ranks.log" "$dir/others.log"
 cat "$dir/ranks.count" "$dir/others.count" >>"$dir/counts"
 

@@ -318,6 +318,7 @@ def test_unconverged_steps_are_reported(tmp_path):
     assert good.summary["unconverged_steps"] == 0 and not warned(good, "limit of work")
 
 
+@pytest.mark.slow
 def test_the_mean_does_not_hang_on_the_tolerance(tmp_path):
     """Tenfold tighter: the mean over four fields moves by less than its standard error, each single one by less than
     two."""

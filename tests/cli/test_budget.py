@@ -72,6 +72,7 @@ def test_intervals_hold_the_variances():
     assert all(0.9 <= n / 200 <= 1.0 for n in inside.values()), inside
 
 
+@pytest.mark.slow
 def test_ishigami_through_the_ensemble(tmp_path):
     """Ishigami & Homma 1990 with noise, in the file of an ensemble, by the code that reads one."""
     a, b, pi, rng = 7.0, 0.1, np.pi, np.random.default_rng(3)

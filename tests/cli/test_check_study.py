@@ -210,6 +210,7 @@ def under(ranks, *arguments, cwd):
                           cwd=cwd, env=env, capture_output=True, text=True, timeout=60)
 
 
+@pytest.mark.slow
 def test_its_ranks_are_counted(tmp_path):
     """How many members at a time, what they take then, and whether there are enough."""
     study = {"base": "base.yml", "ranks": 2, "set": {"run.duration": 10}}

@@ -97,6 +97,7 @@ def test_a_start_without_a_ramp_is_held_against_one_of_the_own_size(tmp_path):
     assert row["judged"] == "matters" and row["recommended"] == pytest.approx(2 / 0.13, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_ramp_ends_before_the_window(tmp_path):
     """Four times 10 s would end behind the beginning of the window at 30 s; and from 24 s on nothing is left to try."""
     found, text = converged(tmp_path, changed(LINE, tow__ramp=10), "--vary", "start", "--budget", 3, "--margin", 1e-3)
@@ -105,6 +106,7 @@ def test_a_ramp_ends_before_the_window(tmp_path):
     assert [row["judged"] for row in rows] == ["matters"] * 2 and converge.WINDOW_TOO_EARLY in text
 
 
+@pytest.mark.slow
 def test_a_channel_that_is_too_narrow_is_found(tmp_path):
     """Dense ice that is pushed along between walls two body widths apart is another thing than a field."""
     dense = changed(CASE, ice__concentration=0.7, domain__width=4, run__duration=18, output__window_start=6)

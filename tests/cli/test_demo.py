@@ -43,6 +43,7 @@ def test_the_demo_needs_only_what_it_has_installed(tmp_path):
     assert (run / "report.html").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("megabytes, says, verdict", [(900, True, "6 passed, 0 failed"),
                                                       (901, True, "5 passed, 1 failed"),
                                                       (900, False, "5 passed, 1 failed")])

@@ -265,6 +265,7 @@ HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Converge
             "Mean ice resistance", "Members", "Replay", "Every key", "Study", "Provenance"]
 
 
+@pytest.mark.slow
 def test_the_answer_comes_first_and_all_else_in_order(page, made):
     assert [h.text for h in page.find_elements("tag name", "h2")] == HEADINGS
     assert page.requests == [(made / "report.html").resolve().as_uri()] and complaints(page) == []
@@ -394,6 +395,7 @@ def test_paths_are_cut(text, left):
     assert report_case.scrubbed(text) == left
 
 
+@pytest.mark.slow
 def test_the_report_of_a_run_as_pdf(made, tmp_path):
     path = tmp_path / "run.pdf"
     report.main([str(made / "members/c001-r001"), "-o", str(path), "--revision", "Q"])

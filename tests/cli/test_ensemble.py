@@ -116,6 +116,7 @@ def test_a_line_that_a_kill_kept_out_of_the_journal_is_added(quiet, tmp_path):
     assert ensemble(tmp_path).returncode == DONE and len(journal(tmp_path)) == len(lines)
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone(quiet, tmp_path):
     """Red when SIGPIPE ends the ensemble after its first line."""
     folder, _ = quiet

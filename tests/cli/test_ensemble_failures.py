@@ -213,6 +213,7 @@ def died(folder, member):
     return len((folder / "all/members" / member / "attempts").read_text())
 
 
+@pytest.mark.slow
 def test_a_dead_rank(tmp_path, page):
     prepare(tmp_path, LONG | {"ranks": 2})
     assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == 1
@@ -233,6 +234,7 @@ def test_a_dead_rank(tmp_path, page):
         "c002-r001"] and "failed" in rows["c002-r001"]
 
 
+@pytest.mark.slow
 def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_path):
     """Two members that each had their process die nineteen times: one of them does nothing wrong."""
     prepare(tmp_path, LONG | {"repeats": 2})

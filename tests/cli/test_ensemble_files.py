@@ -28,6 +28,7 @@ def refused(folder, name):
     return result.returncode == CASE and f"{folder}/{name}: has changed since members in all were made" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_table_that_has_changed_is_another_study(tmp_path):
     write(tmp_path, current=0.01)
     prepare(tmp_path, STUDY, BASE)

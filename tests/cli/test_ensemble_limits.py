@@ -69,6 +69,7 @@ def test_the_disk_of_members_without_frames(tmp_path):
     assert disk(STUDY) < 0.8 * disk(STUDY | {"set": {"output.frame_interval": 0.1}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ranks", quick([1, 2], 1))
 def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
     """200 steps a member, in calls of 80: two leave all of them, the third ends them, with the same file."""
@@ -104,6 +105,7 @@ def test_a_limit_of_wall_time(tmp_path):
         assert ensemble(tmp_path, "all", bad).returncode == USAGE
 
 
+@pytest.mark.slow
 def test_a_limit_of_wall_time_leaves_whole_fields(quiet, tmp_path):
     """Without one the longest members come first, so that the last do not wait for a long one."""
     prepare(tmp_path)

@@ -172,6 +172,7 @@ def test_without_permission(quiet, copy):
     assert result.returncode == DONE and differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == []
 
 
+@pytest.mark.slow
 def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
     """By a lock of the test's own: the call ends when the member is free and done; --no-wait says what is left, with
     another code."""

@@ -25,6 +25,7 @@ def test_the_base_case_is_what_the_readme_says():
     assert int(floes.split()[-1]) > 10_000
 
 
+@pytest.mark.slow
 def test_a_study_makes_a_table_and_keeps_what_is_done(tmp_path):
     first = study("concentration", "--concentrations", 0.1, 0.4, "--out", tmp_path, *SMALL)
     assert first.returncode == DONE, first.stderr

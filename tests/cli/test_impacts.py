@@ -56,6 +56,7 @@ def prescribed(tmp_path_factory):
     return run(tmp_path_factory.mktemp("speed"), changed(LINE, tow={"speed": 0.13, "ramp": 2}, body__yaw=20))
 
 
+@pytest.mark.slow
 def test_panels_carry_the_ice_force_at_every_sample(line, prescribed):
     total, fx, fy = prescribed.dataset("/panels/force").sum(axis=1), *prescribed.series("ice_force_x", "ice_force_y")
     c, s = np.cos(np.pi / 9), np.sin(np.pi / 9)

@@ -618,6 +618,7 @@ def test_a_missing_library_is_named(tmp_path):
     assert r.returncode == IO and "apt-get install python3-gdal" in r.stderr and "Traceback" not in r.stderr
 
 
+@pytest.mark.slow
 def test_from_python(tmp_path):
     """The same file and numbers as the command's; what is not understood is its message."""
     sys.path.insert(0, str(ROOT / "postproc"))

@@ -236,6 +236,7 @@ def test_what_cannot_go_on_is_a_message(going_on, tmp_path):
     assert "holds no" in going_on(tmp_path / "empty", code=1)
 
 
+@pytest.mark.slow
 def test_man_page_and_completions_know_every_option(prefix):
     page = (prefix / "share/man/man1/bergtow.1").read_text().replace("\\-", "-")
     bash = (prefix / "share/bash-completion/completions/bergtow").read_text()
@@ -359,11 +360,13 @@ def library_of(pythonpath):
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_python_finds_the_package_as_make_install_says(tmp_path):
     said = make("install", f"PREFIX={tmp_path}")
     assert library_of(re.search(r"export PYTHONPATH=(\S+)", said)[1]) == f"{tmp_path}/lib/libbergtow.so.0"
 
 
+@pytest.mark.slow
 def test_the_link_of_the_debian_package_is_to_the_python_package(tmp_path):
     assert "PYTHONPATH" not in make("install", "PREFIX=/usr", f"DESTDIR={tmp_path}")
     place, link = (tmp_path / p for p in (ROOT / "install/debian/python3-bergtow.links").read_text().split())

@@ -104,6 +104,7 @@ def test_greedy_table(tmp_path, kind):
     refusal(tmp_path, changed(SMALL, water__current_table=name), fragment, command="check")
 
 
+@pytest.mark.slow
 def test_outlines_without_end(tmp_path):
     (tmp_path / "deep.json").write_text("[" * 1000000)
     refusal(tmp_path, changed(SMALL, ice={"outlines": "deep.json"}), "deep.json", "JSON")
@@ -141,6 +142,7 @@ def contents(folder):
     return {p.relative_to(folder): (p.lstat().st_mode, p.lstat().st_mtime_ns) for p in folder.rglob("*")}
 
 
+@pytest.mark.slow
 def test_no_key_of_a_case_names_output(tmp_path):
     """Every text key, pointed outside in turn: nothing changes there. A new text key has to be put into one of the two
     sets."""

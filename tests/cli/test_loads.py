@@ -469,6 +469,7 @@ def options(**changes):
                                  "resamples": 1} | changes)
 
 
+@pytest.mark.slow
 def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     e = Ensemble(towed(tmp_path / "a", pressure=1e6, load=2e6))
     e.summary["estimates_length_scale"] = np.full(e.n, 25.0)

@@ -96,6 +96,7 @@ def test_what_inertia_takes_of_the_start(towed):
     assert len({round(v, 6) for v in found.values()}) > 1  # or any member's would do
 
 
+@pytest.mark.slow
 def test_a_bridle_that_loses_a_branch_before_the_window(tmp_path):
     """Its window may be steady, and no number but the list of events tells it."""
     case = changed(VESSEL, tow__line={"branches": 2, "breaking_load": 0}, tow__branch2={"breaking_load": 120})

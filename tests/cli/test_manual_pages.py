@@ -30,6 +30,7 @@ def page(manual, name):
     return (manual / "docs" / name).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_links_lead_somewhere(manual):
     """Every link and picture of every page, with the place within the page it leads to."""
     texts = {p: p.read_text(encoding="utf-8") for p in manual.rglob("*.html")}
@@ -48,10 +49,12 @@ def test_links_lead_somewhere(manual):
     assert seen > 2000 and len(texts) > 50
 
 
+@pytest.mark.slow
 def test_the_start_is_the_manual(manual):
     assert "docs/index.html" in (manual / "index.html").read_text()
 
 
+@pytest.mark.slow
 def test_every_key_and_quantity_is_there(manual):
     table = json.loads(call("--list-keys", "--json").stdout)
     text = page(manual, "reference/keys.html")
@@ -65,12 +68,14 @@ def test_every_key_and_quantity_is_there(manual):
             assert {next(iter(r.values())) for r in rows} <= shown
 
 
+@pytest.mark.slow
 def test_every_command_is_there(manual):
     text = page(manual, "reference/commands.html")
     for name in re.findall(r"^  ([a-z]+)  ", call("--help").stdout, re.M):
         assert f'id="{name}"' in text
 
 
+@pytest.mark.slow
 def test_every_function_of_the_headers_is_there(manual):
     found = "".join(p.read_text(encoding="utf-8") for p in (manual / "docs/reference/c").glob("*.html"))
     entries = set(re.findall(r'id="c\.(bt_\w+)"', found))
@@ -93,12 +98,14 @@ def test_comments_go_with_their_declarations():
     assert headers.prototype("typedef void (*bt_y)(void);") is None
 
 
+@pytest.mark.slow
 def test_the_python_package_is_there(manual):
     text, names = page(manual, "reference/python.html"), {}
     exec(re.search(r"^__all__ = .*?\]", (ROOT / "postproc/bergtow/__init__.py").read_text(), re.M | re.S)[0], names)
     assert all(f'id="bergtow.{name}"' in text for name in names["__all__"])
 
 
+@pytest.mark.slow
 def test_every_picture_of_the_cases_is_in_the_gallery(manual):
     text = page(manual, "reference/gallery.html")
     named = [picture for readme in (ROOT / "cases").glob("*/README.md")

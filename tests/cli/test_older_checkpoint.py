@@ -6,6 +6,7 @@ Red when depths are taken for impulses, or friction is lost.
 """
 import h5py
 import numpy as np
+import pytest
 
 from harness import DONE, CASE, Run, call, changed, differing, run
 from made_up_ensemble import seal
@@ -76,6 +77,7 @@ def test_what_was_not_counted_is_not_known(tmp_path):
             assert np.all(np.isnan(x[:70])) and np.all(np.isfinite(x[70:])), name
 
 
+@pytest.mark.slow
 def test_speeds_that_were_not_measured_are_those_ordered(tmp_path):
     """Red when a mean is taken over the steps that have them: it would be that of another window."""
     case = changed(CRUSHING, tow__mode="line", tow__line_length=2, tow__line_stiffness="10 kN")
@@ -93,6 +95,7 @@ def test_speeds_that_were_not_measured_are_those_ordered(tmp_path):
     assert estimates["speed_along_m_s"] == estimates["ordered_speed_m_s"] == 0.3
 
 
+@pytest.mark.slow
 def test_a_window_that_went_over_ground_goes_on_in_the_ice(tmp_path):
     """Red when its rear is missed, or is taken for one in the ice: that drifts, and no floe is renewed from then on."""
     case = {

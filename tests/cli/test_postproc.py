@@ -466,6 +466,7 @@ def _body_centre(tmp_path, frame, position):
     return rows.mean(), columns.mean(), np.ptp(rows), np.ptp(columns)
 
 
+@pytest.mark.slow
 def test_geographic_frame_is_drawn_north_up_and_east_right(tmp_path):
     middle = _body_centre(tmp_path, "geographic", (0.0, 0.0))
     north = _body_centre(tmp_path, "geographic", (8.0, 0.0))

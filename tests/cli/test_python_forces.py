@@ -47,6 +47,7 @@ a.end()
     return datasets_of(folder / "result.h5"), bergtow.Result(folder).summary["state_hash"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", quick([SHORT, LINE], LINE), ids=["speed", "line"])
 def test_a_force_that_comes_later_leaves_a_run_alone(case, tmp_path):
     alone, state = beside_a_late_force(case, tmp_path / "alone", late=False)

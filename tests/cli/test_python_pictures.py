@@ -42,8 +42,8 @@ def drawn_by(name, *arguments):
     pytest.param("force", [], {}, marks=pytest.mark.slow),
     ("force", ["--max", "50"], {"max": 50}),
     ("field", ["--colour", "force", "--times", "1", "3"], {"colour": "force", "times": [1, 3]}),
-    ("impacts", [], {}),
-    ("resistance", ["--linear"], {"linear": True}),
+    pytest.param("impacts", [], {}, marks=pytest.mark.slow),
+    pytest.param("resistance", ["--linear"], {"linear": True}, marks=pytest.mark.slow),
 ])
 def test_a_picture_is_that_of_the_script(towed, tmp_path, name, words, options):
     picture = getattr(bergtow, f"plot_{name}")(bergtow.Result(towed), **options)
@@ -52,6 +52,7 @@ def test_a_picture_is_that_of_the_script(towed, tmp_path, name, words, options):
     assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
 
 
+@pytest.mark.slow
 def test_what_cannot_be_drawn_is_said(towed, tmp_path):
     with pytest.raises(bergtow.BergtowError, match="holds neither summary.json nor result.h5"):
         bergtow.plot_field(tmp_path)
@@ -177,6 +178,7 @@ def test_make_install_has_the_command(towed, tmp_path):
     assert said.stdout.startswith("usage: bergtow-report ")
 
 
+@pytest.mark.slow
 def test_the_source_tree_has_the_command(towed, tmp_path):
     """Not the package: nothing has been put anywhere, and what is missing is told by a line."""
     command = ROOT / "install/bergtow-report"

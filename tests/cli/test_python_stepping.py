@@ -202,6 +202,7 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
     assert any(int(held) < int(n) for held, n, _ in said)
 
 
+@pytest.mark.slow
 def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
     """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
     theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")

@@ -224,6 +224,7 @@ def test_poses_and_values_are_those_of_the_file(page, tow):
     assert np.all(np.abs(shown(page, n)[:, :2] - pose[last // 2, :, :2]) <= 0.5001 * quantum)
 
 
+@pytest.mark.slow
 def test_plays_pauses_and_ends(page):
     assert js(page, "return [bergtow.playhead, bergtow.playing]") == [0, False]
     button = page.find_element("id", "replay-play")
@@ -460,6 +461,7 @@ def test_says_when_the_browser_cannot_unpack(chrome, alone):
 
 # ---- without a browser
 
+@pytest.mark.slow
 def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
     """Every section that a run has nothing for is left out; a picture of a line of which nothing is left is drawn."""
     adrift = run(

@@ -214,6 +214,7 @@ def test_members_of_other_builds_and_lost_folders_are_reported(study):
     assert not Ensemble(study).builds
 
 
+@pytest.mark.slow
 def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeypatch):
     """What the other commands left beside the ensemble stands in its report, in the order of a reader's questions."""
     folder = shutil.copytree(study, tmp_path / "out")
@@ -313,6 +314,7 @@ def test_a_limit_that_is_not_resolved_is_not_stated_as_one():
         ["between 20.0 % and 90.0 %; not resolved: not monotonic: at 0.5 0 of 6 make it (of another case)"]
 
 
+@pytest.mark.slow
 def test_what_differs_between_conditions_stands_with_them(tmp_path):
     """Model, limits, line and keys of variants; and whose fields are the same. The first condition spoke for all."""
     base = changed(TOW, run__duration=4, ice__concentration=0.3, output__window_start=2,

@@ -325,6 +325,7 @@ def small_disk(tmp_path):
         subprocess.run(["umount", "-l", disk], check=False)
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up(tmp_path, small_disk):
     """Whatever write meets it, the earlier checkpoint stays, and the run goes on to the same end when there is
     space."""
@@ -401,6 +402,7 @@ def test_a_folder_that_must_not_be_written(stopped, somebody):
     assert_same_result(whole, out)
 
 
+@pytest.mark.slow
 def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     """In the middle of the run: it ends at the next checkpoint, the last one stays, and it goes on when it may."""
     case = changed(LONG, run__duration=6, output__checkpoint_steps=1500)

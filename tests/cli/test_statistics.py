@@ -136,6 +136,7 @@ def test_doubts_failures_and_gaps_are_counted(plain):
         rows[0]["mean"]) == s["conditions"][0]["resistance"]["mean"] and rows[1]["failed"] == "1"
 
 
+@pytest.mark.slow
 def test_exclude_names_what_it_drops(plain, tmp_path):
     folder, _, before = plain
     result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude",
@@ -176,6 +177,7 @@ def unlike(a, b, at=""):
         yield at, a, b
 
 
+@pytest.mark.slow
 def test_markdown_and_stable_numbers(plain, tmp_path):
     folder, result, s = plain
     again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown", "--partial")

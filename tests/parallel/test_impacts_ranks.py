@@ -48,6 +48,7 @@ def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     assert many.summary["impacts"] == alone.summary["impacts"]
 
 
+@pytest.mark.slow
 def test_counted_over_the_window_that_is_found(tmp_path):
     """On two ranks, and after stops before the window begins and within it, on other ranks each time."""
     case = changed(TOW,

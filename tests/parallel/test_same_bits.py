@@ -13,6 +13,8 @@ import pytest
 
 from harness import PRESS, TOW, call, changed, differing, environment, reading, run
 
+pytestmark = pytest.mark.one_rank
+
 ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 
 # A heavy body on a line among the same floes: rows of the large body, the line's own row, and restitution.

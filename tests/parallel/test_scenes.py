@@ -11,7 +11,7 @@ import subprocess
 import pytest
 
 import scenes
-from harness import BERGTOW, DONE, quick
+from harness import BERGTOW, DONE
 
 RECORDED_WITH, STORED = scenes.stored()
 
@@ -21,12 +21,16 @@ LEFT_OUT = {
 }
 
 
-# make test has one of the two layouts of each scene: what both must leave is stored
-LAYOUTS = [(name, k) for name in scenes.SCENES for k in (0, 1)]
-ONE_EACH = [(name, (k + 1) % 2) for k, name in enumerate(scenes.SCENES)]
+def both():
+    """The layouts of each scene. What both must leave is stored, so that make test has one of them."""
+    for n, name in enumerate(scenes.SCENES):
+        for k, layout in enumerate(scenes.layouts_of(name)):
+            alone = all(ranks == 1 for ranks, _ in layout)
+            yield pytest.param(name, k, marks=[m for m, holds in ((pytest.mark.one_rank, alone),
+                                                                  (pytest.mark.slow, (n + k) % 2 == 0)) if holds])
 
 
-@pytest.mark.parametrize("name, layout", quick(LAYOUTS, *ONE_EACH))
+@pytest.mark.parametrize("name, layout", both())
 def test_scene_is_what_it_was(tmp_path, name, layout):
     items = scenes.run_scene(tmp_path, name, scenes.layouts_of(name)[layout])
     assert name in STORED, f"nothing stored: tests/scenes.py --record {name}"

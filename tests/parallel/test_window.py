@@ -67,6 +67,7 @@ def test_the_same_bits(alone, division):
         assert r.summary["moved_floes"] > 50
 
 
+@pytest.mark.slow
 def test_the_division_is_sound(alone):
     """Copies of a floe on several ranks stay copies, checked every 20 steps and after each migration."""
     folder, one, _ = alone
