@@ -96,7 +96,7 @@ static inline bt_run_totals totals(int steps)
 {
     return (bt_run_totals){.n_steps = steps, .ranks = 1, .threads = 2, .dt = 0.1, .wall_time = 0.6, .mean_size = 2,
                            .concentration = 0.8, .tolerance = 1e-5, .state_hash = 0x0123456789abcdefu,
-                           .phases = {1, 2, 3, 4, 5, 6, 7}};
+                           .phases = {1, 2, 3, 4, 5, 6, 7, 0}};
 }
 
 static inline void frame(int k, double pose[BODIES][3], double force[FLOES], double speed[BODIES])
