@@ -212,7 +212,6 @@ def differing(a, b, but=()):
     return sorted(n for n in x.keys() | y.keys() if x.get(n) != y.get(n) and n not in but)
 
 
-
 # ---- polygons, independent of the program ----
 
 def area(polygon):

@@ -98,7 +98,7 @@ PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration
 
 
 @pytest.mark.parametrize("case, more, wider", [
-    (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}), 
+    (PERIODIC, (), {"ice.concentration=0.45": {"domain.width": "20.1 m"}}),
     pytest.param(PERIODIC, ("--keep-width",), None, marks=pytest.mark.slow),
     pytest.param(PERIODIC, ("--set", "domain.width=6 m"), None, marks=pytest.mark.slow),
     pytest.param(changed(PERIODIC, domain__y0=-2.5), (), None, marks=pytest.mark.slow),

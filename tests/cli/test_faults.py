@@ -53,7 +53,7 @@ def test_no_memory(scenarios, name):
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("name", quick(SCENARIOS, *(n for n in SCENARIOS if "job" not in n and "second" not in n)))
+@pytest.mark.parametrize("name", quick(SCENARIOS, *(n for n in SCENARIOS if "job" not in n)))
 def test_bytes_before_names_and_names_before_removals(scenarios, name):
     """As the calls come: a file is synced before it gets its name, the folder after it and before others go."""
     _, calls = scenarios(name)
