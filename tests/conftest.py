@@ -11,7 +11,8 @@ import pytest
 def pytest_configure(config):
     config.addinivalue_line("markers", "slow: not in make test, but in make test-long")
     config.addinivalue_line("markers", "one_rank: in parallel/, and of a single process")
-    config.addinivalue_line("markers", "ranks: all others of parallel/, which make test runs with nothing beside them")
+    config.addinivalue_line("markers", "ranks: of several processes, run with nothing beside them in make test: all "
+                                       "others of parallel/")
     if not os.access(harness.BERGTOW, os.X_OK):
         raise pytest.UsageError(f"{harness.BERGTOW}: no such program; build it with make, or name it in BERGTOW")
 

@@ -86,7 +86,8 @@ tested() {
     echo "${p:-0} $f ${s:-0}" >"$count"
 }
 # Ranks that wait for one another want the cores: with other tests beside them they take ten times as long.
-tested ranks ranks tests/parallel
+# shellcheck disable=SC2046 # one word a file
+tested ranks ranks tests/parallel $(grep -l 'mark\.ranks' tests/cli/test_*.py)
 # those that take longest first
 first='tests/cli/test_\(properties\|random_cases\|design\)\.py'
 files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"

@@ -26,6 +26,10 @@
 #include "base/h5axes.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
+// The same at a frame, or so many of them. Not at each: one append a series takes some milliseconds, a quarter of the
+// time of a small run.
+#define FRAME_SECONDS 0.5
+#define FRAMES_WAITING 16
 
 static void create_series(bt_record *r)
 {
@@ -230,6 +234,7 @@ void bt_record_flush(bt_record *r)
     r->buffered = 0;
     bt_impact_store_write(&r->impacts);
     bt_h5_flush(&r->h5);
+    r->frames_waiting = 0;
     r->last_flush = bt_clock();
 }
 
@@ -279,7 +284,9 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, c
     r->h5.err = err;
     const bt_status status = bt_frames_add(&r->frames, time, rows, line);
     if (status != BT_OK) return status;
-    bt_record_flush(r);
+    if (r->comm->rank == 0 &&
+        (++r->frames_waiting == FRAMES_WAITING || bt_clock() - r->last_flush > FRAME_SECONDS))
+        bt_record_flush(r);
     return bt_comm_agree(r->comm, r->h5.status);
 }
 

@@ -213,10 +213,10 @@ bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err);
 
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
-/// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, so that a
-/// running or interrupted result.h5 can be read. After a failure the record takes nothing more, and every call
-/// returns BT_ERR_IO; only the first adds a message. Rank 0 records; on others nothing is done, and the status is not
-/// that of rank 0: agree on it.
+/// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, and with every 16th
+/// frame or the first after half a second, so that a running or interrupted result.part.h5 can be read. After a failure
+/// the record takes nothing more, and every call returns BT_ERR_IO; only the first adds a message. Rank 0 records; on
+/// others nothing is done, and the status is not that of rank 0: agree on it.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
 
 /// An overlap that no sample holds: that of the last state, m. After bt_record_save, whose state a further step goes on

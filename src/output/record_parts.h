@@ -29,6 +29,7 @@ struct bt_record {
     double *merged;        ///< [n_series] of the steps of the present entry
     int64_t n_merged;
     double last_flush;     ///< bt_clock
+    int frames_waiting;    ///< since then
     hid_t events[4];       ///< time, kind, subject, value
     int64_t n_events;      ///< written
     bt_frames frames;

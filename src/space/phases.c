@@ -93,10 +93,12 @@ void bt_phases_order(bt_world *w)
 // --- passes ----------------------------------------------------------------------------------------------------------
 
 /// A pass, as each thread sees it.
-typedef struct {
+typedef struct pass {
     bt_world *w;
     bt_visit *visit;
     const void *context;
+    bt_vel *exchanged;
+    bt_idx me, team; ///< number of the thread, and how many there are
     bt_totals own;
 } pass;
 
@@ -112,9 +114,8 @@ static void visit_stretch(pass *o, int stretch)
 {
     bt_cells *t = o->w->cells;
     bt_share *share = &t->share[stretch * t->n_shares];
-    const bt_idx me = omp_get_thread_num();
     for (bt_idx n = 0; n < t->n_shares; n++) {
-        bt_share *s = &share[(me + n) % t->n_shares];
+        bt_share *s = &share[(o->me + n) % t->n_shares];
         for (;;) {
             if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) break;
             const bt_idx i = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
@@ -124,27 +125,59 @@ static void visit_stretch(pass *o, int stretch)
     }
 }
 
-static void run_phases(pass *o, bt_vel *exchanged)
+/// Waits for the other threads.
+static void wait_for_team(const pass *o)
+{
+    if (o->team == 1) return;
+#pragma omp barrier
+}
+
+static void run_phases(pass *o)
 {
     bt_world *w = o->w;
-    const bool among = w->exchange != NULL;
+    const bool among = w->exchange != NULL, sends = among && o->exchanged && o->me == 0;
     const bt_cells *t = w->cells;
     for (int p = 0; p < BT_PHASES; p++) {
         if (among) {
             visit_stretch(o, 2 * p);
-#pragma omp barrier
-            if (exchanged) {
-#pragma omp master
-                w->exchange->send(w, p, exchanged);
-            }
+            wait_for_team(o);
+            if (sends) w->exchange->send(w, p, o->exchanged);
         }
         if (t->start[p] + t->n_border[p] < t->start[p + 1]) visit_stretch(o, 2 * p + 1);
         else if (!among) continue; // no other cell was here
-        if (among && exchanged) {
-#pragma omp master
-            w->exchange->receive(w, p, exchanged);
-        }
-#pragma omp barrier
+        if (sends) w->exchange->receive(w, p, o->exchanged);
+        wait_for_team(o);
+    }
+}
+
+static void run_stretches(pass *o)
+{
+    for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(o, s);
+}
+
+static void run_as_one(void run(pass *), pass o, bt_totals *t)
+{
+    run(&o);
+#pragma omp critical
+    bt_totals_merge(t, &o.own);
+}
+
+/// The pass on all threads. One thread goes without OpenMP: in libgomp a team of one and each of its barriers enter the
+/// kernel too, to wake nobody, which was a sixth of the time of a small run.
+static void run_on_team(void run(pass *), const pass *each, bt_totals *t)
+{
+    bt_cells *cells = each->w->cells;
+    open_shares(cells);
+    if (cells->n_shares == 1) {
+        run_as_one(run, *each, t);
+        return;
+    }
+#pragma omp parallel num_threads(cells->n_shares)
+    {
+        pass o = *each;
+        o.me = omp_get_thread_num();
+        o.team = omp_get_num_threads();
+        run_as_one(run, o, t);
     }
 }
 
@@ -166,31 +199,24 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
         run_plain(w, visit, context, exchanged, t);
         return;
     }
-    open_shares(w->cells);
-#pragma omp parallel num_threads(w->cells->n_shares)
-    {
-        pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
-        run_phases(&o, exchanged);
-#pragma omp critical
-        bt_totals_merge(t, &o.own);
-    }
+    const pass each = {.w = w, .visit = visit, .context = context, .exchanged = exchanged, .team = 1,
+                       .own = {.n_sums = t->n_sums}};
+    run_on_team(run_phases, &each, t);
 }
 
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
-    open_shares(w->cells);
-#pragma omp parallel num_threads(w->cells->n_shares)
-    {
-        pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
-        for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(&o, s);
-#pragma omp critical
-        bt_totals_merge(t, &o.own);
-    }
+    const pass each = {.w = w, .visit = visit, .context = context, .team = 1, .own = {.n_sums = t->n_sums}};
+    run_on_team(run_stretches, &each, t);
 }
 
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
 {
     const bt_cells *ts = w->cells;
+    if (ts->n_shares == 1) {
+        for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
+        return;
+    }
 #pragma omp parallel for schedule(static) num_threads(ts->n_shares)
     for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
 }

@@ -332,6 +332,7 @@ def test_every_stratum_of_each_distribution_holds_one_value(small):
         attributes["distribution"])
 
 
+@pytest.mark.slow
 def test_a_study_end_to_end(small):
     folder, text = small
     found = json.loads((folder / "out/budget.json").read_text())

@@ -78,9 +78,11 @@ def test_the_fender_softens_the_load_and_books_what_it_took(tmp_path):
 LINE = changed(resuming.CASE, fender=FENDER, run__duration=9, output__checkpoint_steps=30)
 
 
-@pytest.mark.parametrize("case, layouts", [(LINE, ((1, 2), (3, 1))),
+@pytest.mark.parametrize("case, layouts", [(LINE, ((3, 2), )),
+                                           pytest.param(LINE, ((1, 2), (3, 1)), marks=pytest.mark.slow),
                                            pytest.param(WINDOW, ((2, 2), ), marks=pytest.mark.slow)],
-                         ids=["line", "window"])
+                         ids=["line", "line, more layouts", "window"])
+@pytest.mark.ranks
 def test_same_bits_in_every_layout_and_after_a_stop(tmp_path, case, layouts):
     case = changed(case, output__sample_every=3)
     whole, summary, _ = of_run(tmp_path / "whole", case)

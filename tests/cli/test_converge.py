@@ -125,6 +125,7 @@ def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp
     assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text
 
 
+@pytest.mark.slow
 def test_runs_are_kept_and_a_spent_budget_is_reported(tmp_path):
     found, _ = converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.2, "--margin", 1e-6)
     made = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/converge/*/*/summary.json")}

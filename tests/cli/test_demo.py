@@ -25,6 +25,7 @@ def test_the_demo_says_how_long_it_takes():
 LATER = ("scipy", "pandas", "xarray", "netCDF4", "shapely", "pyproj", "osgeo", "geopandas", "dask", "mpi4py", "pytest")
 
 
+@pytest.mark.slow
 def test_the_demo_needs_only_what_it_has_installed(tmp_path):
     """Its scripts, with the packages hidden that a newcomer does not have yet."""
     for name in LATER:

@@ -71,6 +71,7 @@ def pages_of(path):
 
 # ---- the command
 
+@pytest.mark.slow
 def test_the_study_that_it_makes(made):
     study = yaml.safe_load((made / "design.yml").read_text())
     assert study["parameters"] == {"ice.concentration": [0.2, 0.4]} and study["repeats"] == 5 and study["seed"] == 3

@@ -32,6 +32,7 @@ def client(monkeypatch):
         yield c
 
 
+@pytest.mark.slow
 def test_workers_make_the_same_file(client, tmp_path, capfd):
     path = study(tmp_path)
     assert call("ensemble", path, "-o", tmp_path / "alone", "--set", "ice.friction=0.1").returncode == 0

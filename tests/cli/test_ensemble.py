@@ -101,6 +101,7 @@ def test_killed_and_called_again(quiet, tmp_path):
                   if j["event"] == "finished") == sorted(p.name for p in (tmp_path / "all/members").iterdir())
 
 
+@pytest.mark.slow
 def test_a_line_that_a_kill_kept_out_of_the_journal_is_added(quiet, tmp_path):
     folder, _ = quiet
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
@@ -159,6 +160,7 @@ def test_interrupted(quiet, tmp_path, number):
     assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 
+@pytest.mark.slow
 def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
     folder, _ = quiet
     prepare(tmp_path)

@@ -156,6 +156,7 @@ def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
 
 
 @pytest.mark.parametrize("size", ["16k", "900k"])
+@pytest.mark.slow
 def test_four_jobs_on_a_full_disk(quiet, tmp_path, tmpfs, size):
     """All of them end by themselves and say why, in whatever file they find it full; with room, one more call ends as
     the ensemble that always had it."""
@@ -280,6 +281,7 @@ def test_members_that_cannot_be_read(tmp_path):
         assert ensemble(tmp_path).returncode == DONE and (folder / "ensemble.h5").read_bytes() == whole
 
 
+@pytest.mark.ranks
 def test_a_base_case_that_one_rank_cannot_read(tmp_path):
     """Red when the other goes on to share the cores with it: a message about MPI, or a call that hangs."""
     prepare(tmp_path)

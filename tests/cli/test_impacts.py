@@ -186,6 +186,7 @@ def test_samples_of_several_steps_hold_means(line, tmp_path):
         "collisions").sum() and r.summary["impacts"] == line.summary["impacts"]
 
 
+@pytest.mark.slow
 def test_crushing_and_its_keys(line, tmp_path):
     r = run(tmp_path, changed(LINE, impact={"conversion": "crushing", "pressure": "50 kPa", "corner_angle": 60}))
     assert r.hash == line.hash
@@ -205,6 +206,7 @@ def test_crushing_and_its_keys(line, tmp_path):
     assert len(np.unique(real.round(6))) > 10 and np.all((real > 0.3) & (real < np.pi))
 
 
+@pytest.mark.slow
 def test_the_real_corner_of_a_floe_in_parts(tmp_path):
     """A spike, 8 m long on a base of 4 m: its angle is that of the outline, whatever the parts are."""
     outline = [[30, -10], [40, -10], [40, 10], [30, 10], [30, 2], [22, 0.05], [30, -2], [30, -10]]

@@ -163,6 +163,7 @@ def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
 
 # ---- fields that are not alike
 
+@pytest.mark.slow
 def test_levels_of_fields_that_differ():
     """Of no difference those of the process; of a scale of each field, what simulated years have."""
     same, unlike = UNLIKE(0.9, 0.0), UNLIKE(0.9, 0.5)

@@ -9,7 +9,7 @@ import pytest
 import xarray
 import yaml
 
-from harness import BERGTOW, TOW, changed, environment, write_case
+from harness import BERGTOW, TOW, changed, environment, quick, write_case
 
 FULL = changed(TOW, run__duration=3, run__title="A tow", output__window_start=1, output__frame_interval=1,
                output__panels=True, output__checkpoint_steps=10, domain__length=12, domain__width=6,
@@ -76,7 +76,7 @@ def test_every_dataset_has_units_a_name_and_axes(made, name):
         assert f.attrs["Conventions"] == "CF-1.8" and "bergtow" in f.attrs["source"]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", quick(ENGINES, "netcdf4"))
 def test_xarray_opens_every_group(made, engine):
     """The values of h5py, with named dimensions; time, and the member, as coordinates."""
     for name in FILES:

@@ -500,6 +500,7 @@ def test_film_as_gif_follows_the_body(tmp_path):
     assert list(tmp_path.glob("*.part")) == []
 
 
+@pytest.mark.slow
 def test_film_as_mp4_has_every_frame(tmp_path):
     run = make_run(tmp_path / "run", path=[(float(i), 0.0) for i in range(7)])
     done(script("animate.py", run, "--width", 501), run / "film.mp4")

@@ -179,6 +179,7 @@ except bergtow.BergtowError as error:
     assert go("resume", "left", "right").returncode == 0
 
 
+@pytest.mark.ranks
 def test_two_ranks_have_the_state_of_one(tmp_path):
     case = write_case(tmp_path, changed(SHORT, ice__concentration=0.7))
     script = tmp_path / "ranks.py"

@@ -239,6 +239,7 @@ def test_every_number_of_a_member_is_in_the_ensemble(ensemble):
                     assert all(attributes[k] == meaning[k] for k in ("description", "units")), key
 
 
+@pytest.mark.slow
 def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_path):
     done = script("ensemble.py", ensemble, "--resamples", 50)
     assert done.returncode == 0, done.stderr
@@ -305,7 +306,8 @@ def test_the_examples_are_what_they_say(tmp_path):
                                                                            said) and "energy of the strip" in said
 
 
-@pytest.mark.parametrize("name", quick(CASES, "line", "window"))
+@pytest.mark.parametrize("name", quick(CASES, "window"))
+@pytest.mark.ranks
 def test_everything_survives_stop_and_resume(tmp_path, name):
     """Samples of three steps, stopped within one; resumed on other ranks than the whole run has."""
     case = changed(CASES[name][0], output__sample_every=3)

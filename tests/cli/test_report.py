@@ -129,6 +129,7 @@ def text(driver, selector):
 
 # ---- the page
 
+@pytest.mark.slow
 def test_needs_nothing_but_itself(page, alone):
     assert [r for r in page.requests if not r.startswith("data:")] == [alone.resolve().as_uri()]
     assert all(js(page, "return [...document.querySelectorAll('figure svg')].map((s) => s.getBBox().width > 300)"))
@@ -361,6 +362,7 @@ def test_pointing_at_a_floe_tells_its_values(page, tow):
         force[floe], rel=0.006)
 
 
+@pytest.mark.slow
 def test_zoom_drag_and_fit(page):
     field = page.find_element("id", "replay-field")
     metre, at = js(page, "return bergtow.metre"), np.array(js(page, "return bergtow.screen(5)"))

@@ -456,6 +456,7 @@ def flat_names(path):
     return names
 
 
+@pytest.mark.slow
 def test_a_small_ensemble_of_the_program(tmp_path):
     write_case(tmp_path, changed(TOW, run__duration=60, output__window_start=5, domain__length=20), "base.yml")
     (tmp_path / "study.yml").write_text(

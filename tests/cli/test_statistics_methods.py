@@ -320,6 +320,7 @@ def latin(n, k, seed):
     return (np.array([rng.permutation(n) for _ in range(k)]).T + rng.random((n, k))) / n
 
 
+@pytest.mark.slow
 def test_ishigami():
     # Ishigami & Homma 1990: f = sin x1 + a sin² x2 + b x3^4 sin x1 on (-pi, pi)
     a, b, pi = 7.0, 0.1, np.pi

@@ -166,6 +166,7 @@ def test_a_wall_or_a_pier_on_the_way_is_refused(tmp_path):
     run(tmp_path, changed(pier, tow__waypoints=[[-200, -200], [-200, 500]]), "--quiet", name="c")
 
 
+@pytest.mark.slow
 def test_the_froude_twin_is_towed_alike(tmp_path):
     """L = 4: lengths times 4, times times 2, forces times 64, also of programme, way-points, named line and vessel."""
     case = changed(VESSEL, run__duration=400, water=None)

@@ -100,6 +100,7 @@ def test_large_blocks_arch(done):
     assert all(f["after"] > 0 and f["passed"][0] == 0 for f in found if f["arrest"])
 
 
+@pytest.mark.slow
 def test_the_speed_is_a_scale(done):
     """Rigid contacts and quadratic drag: twice the speed with half the time step is the same motion, four times the
     force."""
@@ -194,6 +195,7 @@ def test_walls_carry_part_of_the_cover(done):
 # --- ship ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_band_rises_with_friction(done):
     def at(mu):
         return ship.point([done("ship", ship.resistance, ice__friction=mu, ice__seed=seed) for seed in (1, 2, 3)])

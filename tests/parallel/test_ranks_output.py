@@ -161,7 +161,7 @@ def test_what_needs_one_rank_is_done_by_one(tmp_path, arguments):
 def test_a_disk_that_fills_up_in_the_run(tmp_path, rank):
     """For one rank only: the others must hear of it. Without shared memory, whose files would be too large too."""
     write_case(tmp_path, changed(SHORT, output__frame_interval=0.1))
-    limited = f'[ "{RANK}" != {rank} ] || ulimit -f 900; exec "$@"'
+    limited = f'[ "{RANK}" != {rank} ] || ulimit -f 1600; exec "$@"'
     result = mpirun(3,
                     "run",
                     "case.yml",

@@ -4,13 +4,14 @@ import subprocess
 
 import pytest
 
-from harness import BERGTOW, DONE, TOW, USAGE, changed, differing, environment, write_case
+from harness import BERGTOW, DONE, TOW, USAGE, changed, differing, environment, quick, write_case
 from test_ranks_output import mpirun, ours
 
 CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=14, ice__concentration=0.3, ice__size=0.9)
 
 
-@pytest.mark.parametrize("command", ["budget", "capability", "converge", "design", "outlines"])
+@pytest.mark.parametrize("command", quick(["budget", "capability", "converge", "design", "outlines"], "design",
+                                          "outlines"))
 def test_two_ranks_are_refused(tmp_path, command):
     """Each would make the same study, in the same folder."""
     write_case(tmp_path, CASE)
