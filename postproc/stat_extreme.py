@@ -231,13 +231,13 @@ def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
         if rate * T <= 1:
             levels.append((np.nan, (np.nan, np.nan)))
             continue
-        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best) * rate_share(
-            alone, by_field, lambda theta: level(theta, T), best)
+        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best)
+        share = rate_share(alone, by_field, lambda theta: level(theta, T), best)
         z = level(best, T)
         def profile(q, rest):
             g = growth(rest[0], rate * T)
             return gpd_minus_log_likelihood(np.log(q / g), rest[0], total) if q > 0 and g > 0 else np.inf
-        low, high = stat_profile.interval(profile, z, [shape], stat_profile.drop(n, c), 0.1 * z)
+        low, high = stat_profile.interval(profile, z, [shape], stat_profile.drop(n, c, share), 0.1 * z)
         levels.append((threshold + unit * z, (threshold + unit * max(low, 0.0), threshold + unit * high)))
     c = stat_profile.dispersion(lambda theta: by_field(np.append(theta, best[2])), lambda theta: theta[1], best[:2])
     ends = stat_profile.interval(lambda q, rest: gpd_minus_log_likelihood(rest[0], q, total), shape, [0.0],

@@ -54,8 +54,7 @@ BALANCES = {
 
 
 @pytest.fixture(scope="module",
-                params=quick(BALANCES, "slack line, e = 0.5",
-                             "line, tide, dynamic tilt, wind, Coriolis, geographic",
+                params=quick(BALANCES, "line, tide, dynamic tilt, wind, Coriolis, geographic",
                              "speed, tide, geostrophic, wind, Coriolis, geographic"))
 def balanced(request, tmp_path_factory):
     return BALANCES[request.param], run(tmp_path_factory.mktemp("balance"), BALANCES[request.param])

@@ -379,6 +379,7 @@ def test_a_study_end_to_end(small):
     assert "of another case, ice.size is 77 m there" in numerics["refused"] and numerics["refused"] in said
 
 
+@pytest.mark.slow
 def test_what_is_refused(small, tmp_path):
     folder, _ = small
     def said(study, *more, out="refused"):

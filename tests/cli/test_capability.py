@@ -275,7 +275,8 @@ def test_the_limit_of_concentration_against_brute_force(tmp_path):
     assert before == {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/capability/**/summary.json")}
 
 
-@pytest.mark.parametrize("more", [(), pytest.param(("--keep-width",), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [(), ("--keep-width",)])
 def test_dense_ice_gets_the_width_that_it_needs(tmp_path, more):
     """Red when a tow stops in dense ice because its periodic images are near."""
     case = changed(THRUST, domain__sides="periodic", run__duration=10, output__window_start=5)
@@ -311,6 +312,7 @@ def test_the_bollard_pull_that_open_water_asks_for(tmp_path):
     assert "N" in text.splitlines()[2]
 
 
+@pytest.mark.slow
 def test_a_line_that_parts_is_no_tow(tmp_path):
     case = changed(THRUST, tow__mode="line", tow__line__breaking_load=9, run__duration=20)
     del case["tow"]["vessel"]

@@ -115,7 +115,7 @@ def quiet(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("size", ["4k", "64k"])
+@pytest.mark.parametrize("size", ["4k", pytest.param("64k", marks=pytest.mark.slow)])
 def test_a_full_disk_of_one_member(quiet, tmp_path, tmpfs, page, size):
     """4 kB are full before the run begins, and take no record of the failure either; 64 kB become full within it."""
     prepare(tmp_path)

@@ -230,6 +230,7 @@ def test_a_failed_member_stays_a_hole(tmp_path):
     assert [ensemble(tmp_path).returncode for _ in range(2)] == [CASE, CASE]
 
 
+@pytest.mark.slow
 def test_damage_while_a_call_is_at_work(tmp_path):
     """A member that was sound when the call began is looked at again when it is taken in."""
     write_case(tmp_path, BASE, "base.yml")

@@ -225,6 +225,7 @@ STUCK = {
 }
 
 
+@pytest.mark.slow
 def test_floes_that_a_shake_leaves_in_one_another_fly_on(tmp_path):
     """Found by random_cases.py: floe 51 of this field is still in another when all are at rest."""
     f = Field(make(tmp_path, STUCK))

@@ -280,6 +280,7 @@ def test_keys_that_nobody_has_given_are_not_warned_of(tmp_path, conversion):
     assert r.returncode == DONE and "no effect" not in r.stdout
 
 
+@pytest.mark.slow
 def test_the_picture_shows_what_the_file_holds(line, tmp_path):
     with Folder(line.dir) as folder:
         outlines = plot_impacts.along_hull(folder)

@@ -38,20 +38,24 @@ from bergtow_read import RunError  # noqa: E402
 
 DEAR = b"dear to somebody"
 REFUSED = ": is there already, and was not made by these scripts; .*--force"
+def long(*call):
+    return pytest.param(*call, marks=pytest.mark.slow)
+
+
 #: script: (module, arguments; RUN and ALL stand for the folders of a run and of an ensemble, and files it writes into
 #: the working folder), in each line another kind of file
 CALLS = [
-    (plot_force, ["RUN", "-o", "a.png", "--diagnostics"], ["a.png", "a-diagnostics.png"]),
+    long(plot_force, ["RUN", "-o", "a.png", "--diagnostics"], ["a.png", "a-diagnostics.png"]),
     (plot_field, ["RUN", "-o", "a.svg"], ["a.svg"]),
-    (plot_impacts, ["RUN", "-o", "a.pdf"], ["a.pdf"]),
+    long(plot_impacts, ["RUN", "-o", "a.pdf"], ["a.pdf"]),
     (animate, ["RUN", "-o", "a.mp4", "--frames", "2", "--width", "320"], ["a.mp4"]),
     (animate, ["RUN", "-o", "a.gif", "--frames", "2", "--width", "320"], ["a.gif"]),
     (plot_chains, ["RUN", "contacts.h5", "-o", "a.png"], ["a.png"]),
     (plot_resistance, ["RUN", "-o", "a.png", "--table", "a.md"], ["a.png", "a.md"]),
-    (plot_ensemble, ["ALL", "-o", "."], ["sweep-ice-concentration.png", "exceedance.png"]),
+    long(plot_ensemble, ["ALL", "-o", "."], ["sweep-ice-concentration.png", "exceedance.png"]),
     (ensemble, ["ALL", "-o", ".", "--resamples", "1"], ["statistics.json", "statistics.csv"]),
     (report, ["RUN", "-o", "a.html"], ["a.html"]),
-    pytest.param(report, ["ALL", "-o", "a.pdf"], ["a.pdf"], marks=pytest.mark.slow),
+    long(report, ["ALL", "-o", "a.pdf"], ["a.pdf"]),
     (converge, ["case.yml", "-o", "."], ["converge.json"]),
     (budget, ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
     (capability, ["line.yml", "-o", "."], ["capability.json", "capability.png"]),

@@ -58,6 +58,7 @@ def test_greedy_case(tmp_path, kind):
     assert not (tmp_path / "out").exists(), "something was begun"
 
 
+@pytest.mark.slow
 def test_wrong_floes_are_not_reported_for_ever(tmp_path):
     """10,000 floes of 250 unknown keys: 2.5 million messages, with a search for the nearest key each."""
     case = changed(SMALL, floes=[{f"k{i}": 0 for i in range(250)}] * 3000)

@@ -693,6 +693,7 @@ def test_a_branch_that_parts_before_the_window_is_told(tmp_path):
     assert "value" in found["ice_resistance"]["design"]
 
 
+@pytest.mark.slow
 def test_each_branch_has_its_own_breaking_load(tmp_path):
     """Against its design tension, and against the largest mean of a step, by which it parts."""
     s, text = of_all(parting(tmp_path / "a", {}, second=0.57))

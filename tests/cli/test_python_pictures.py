@@ -128,6 +128,7 @@ def test_statistics_of_an_ensemble(speeds, tmp_path):
     np.testing.assert_allclose([c["resistance"]["mean"] for c in found["conditions"]], means, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_pictures_of_an_ensemble(speeds, tmp_path):
     pictures = bergtow.plot_ensemble(speeds)
     drawn_by("plot_ensemble.py", speeds, "-o", tmp_path)

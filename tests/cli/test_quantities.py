@@ -222,6 +222,7 @@ def ensemble(tmp_path_factory):
     return folder / "all"
 
 
+@pytest.mark.slow
 def test_every_number_of_a_member_is_in_the_ensemble(ensemble):
     quantities = listed(EXTENDED)
     names = [e["name"] for e in quantities["estimates"]]

@@ -374,6 +374,7 @@ def test_zoom_drag_and_fit(page):
     assert np.allclose(js(page, "return bergtow.screen(5)") - at, [40, -25], atol=1.5)
 
 
+@pytest.mark.slow
 def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
     r = run(tmp_path, MOVING)
     ready(chrome, page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch))

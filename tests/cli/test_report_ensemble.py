@@ -85,6 +85,7 @@ def newtons(text):
     return float(value) * {"N": 1, "kN": 1000}[unit]
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_statistics(page, study):
     s = ensemble.statistics(Ensemble(study), argparse.Namespace(**OPTIONS))
     found = tables(page)
@@ -148,7 +149,7 @@ def test_conditions_without_a_value_are_named_beside_the_largest():
     assert said({"label": "95 %", "design": {"tow": None}}).startswith("No value for 95\u00a0%. Largest")
 
 
-@pytest.mark.parametrize("mode", ["speed", "line"])
+@pytest.mark.parametrize("mode", [pytest.param("speed", marks=pytest.mark.slow), "line"])
 def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode):
     """In title, method and answer; the direction varied between conditions stands in degrees."""
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS | {"resamples": 1})

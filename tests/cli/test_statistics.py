@@ -277,6 +277,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
     assert "peaks of different conversions" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_no_part_is_taken_for_the_whole(plain, tmp_path):
     """Members that fail or wait are named, and a script sees it by the exit code."""
     folder, complete, _ = plain

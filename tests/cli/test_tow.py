@@ -234,6 +234,7 @@ def test_a_vessel_in_a_moving_window(tmp_path):
     assert run(tmp_path, r.dir / "case.resolved.yml", "--quiet", name="again").hash == r.hash
 
 
+@pytest.mark.slow
 def test_a_turn_within_the_window_is_no_steady_tow(tmp_path):
     """A corner that a body at a set speed takes within one step has a force as large as the step is short: both are
     said, and a course that is straight, or bends before the window or beyond the end, is not."""

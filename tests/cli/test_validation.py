@@ -83,7 +83,7 @@ def test_a_measured_force_gets_its_ratio(tmp_path):
 # --- arching ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_small_blocks_do_not_arch(done, seed):
     """Block/gap 0.05, with twice the ice that the gap lets through."""
     found = done("arching", arching.flow, **arching.keys(0.05, way=16, seed=seed))
@@ -94,6 +94,7 @@ def test_small_blocks_do_not_arch(done, seed):
     assert late.mean() < 0.8 * arriving, "more arrives than passes"
 
 
+@pytest.mark.slow
 def test_large_blocks_arch(done):
     found = [done("arching", arching.flow, **arching.keys(0.25, 0.4, way=40, seed=seed)) for seed in (1, 2, 3)]
     assert sum(f["arrest"] for f in found) >= 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from harness import ROOT, call, quick, write_case
+from harness import ROOT, call, write_case
 
 sys.path.insert(0, str(ROOT / "postproc"))
 
@@ -44,7 +44,8 @@ def test_too_few_fields_have_no_interval():
     assert np.isnan(plot_variants.relative_change({1: 2.0}, {1: 1.0, 2: 3.0}, False)).all()
 
 
-@pytest.mark.parametrize("fields", quick(["common", "own"], "common"))
+@pytest.mark.slow
+@pytest.mark.parametrize("fields", ["common", "own"])
 def test_variants_of_a_study_are_drawn(tmp_path, fields):
     write_case(tmp_path, BASE, "base.yml")
     study = {

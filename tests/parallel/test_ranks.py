@@ -99,7 +99,7 @@ PAIRS = {
     "ring": [(1, 2), (4, 1)],
 }
 LAYOUTS = quick([(n, *p) for n, pairs in PAIRS.items() for p in pairs], ("line", 1, 2), ("line", 3, 2), ("speed", 2, 2),
-                ("jam", 2, 1), ("seams", 4, 2), ("round", 3, 2), ("tide", 2, 2), ("crush", 3, 1), ("ring", 4, 1))
+                ("jam", 2, 1), ("round", 3, 2), ("tide", 2, 2), ("crush", 3, 1), ("ring", 4, 1))
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):

@@ -280,7 +280,7 @@ def test_sigterm_to_mpirun(tmp_path, start):
     assert_stopped_well(tmp_path, signal.SIGTERM)
 
 
-@pytest.mark.parametrize("rank", [0, 2])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_a_killed_rank_ends_the_run(tmp_path, start, rank):
     p, ranks = start()
     os.kill(ranks[rank], signal.SIGKILL)

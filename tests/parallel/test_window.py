@@ -74,6 +74,7 @@ def test_the_division_is_sound(alone):
     assert_same(one, many(folder, 3, 1, name="valid", program=VALIDATE))
 
 
+@pytest.mark.slow
 def test_overlap_falls_faster_than_the_step(tmp_path):
     """The deepest overlap is the step's and nothing that the window leaves: over four fields 0.0099 and 0.0040 of a
     floe at whole and half steps."""
