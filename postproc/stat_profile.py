@@ -7,9 +7,9 @@ K the square of Student's t quantile of F - 1 degrees of freedom, k of that of F
 g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the
 squared scores of the F fields: c is about 1 where the values of a field are independent of each other and of the field,
 and larger where they are not [Chandler & Bate 2007, Biometrika 94]. c is known as well as F fields tell it. The
-likelihood itself is known better, by all their values, but models of a tail fit by a little less than it says: WORTH
-is what makes 95 % of it on series whose extremes are known (README.md). With K for both, as many as 99 to 100 % of the
-intervals of 5 to 8 fields held the level, with the normal quantile for k as few as 87 %.
+likelihood itself is known better, by all their values, but a model of the tail holds a little less than it says: WORTH
+is chosen on series whose extremes are known (README.md). With K for both, up to 99 to 100 % of the intervals of 5 to 8
+fields held the level; with the normal quantile for k, as few as 87 % of those of 8.
 Follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals of
 exponential tails from 8 and 20 fields they covered 65 to 82 % and 75 to 80 %, since the shape of a short sample is low
 and its resamples are lower still.
@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 
 LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: the likelihood alone, by the normal quantile
-WORTH = 8         # degrees of freedom that the likelihood counts for beside the fields
+WORTH = 3         # degrees of freedom that the likelihood counts for beside the fields
 STEPS = 60        # doublings of the distance before an interval counts as open
 BISECTIONS = 14
 SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of the order of one

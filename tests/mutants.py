@@ -209,7 +209,7 @@ MUTANTS = {
          "w->exchange->receive(w, p, o->exchanged);", "colours overlap in time"),
         ("if (i >= s->end) break;", "if (i > s->end) break;", "a cell of the next share is visited twice"),
         ("2 * cell->phase + !(w->exchange && cell->border)", "2 * cell->phase + 1", "border cells come late"),
-        ("    bt_totals_merge(t, &o.own);\n}\n\n/// The pass on all", "}\n\n/// The pass on all",
+        ("    bt_totals_merge(t, &o.own);\n}\n\n/// The pass on all", "    (void)t;\n}\n\n/// The pass on all",
          "totals of a pass are lost"),
         ("o.me = omp_get_thread_num();", "o.me = 0;", "every thread is the first"),
         ("if (o->team == 1) return;", "if (o->team <= 2) return;", "two threads do not wait"),

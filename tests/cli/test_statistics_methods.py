@@ -285,7 +285,7 @@ def test_profile_likelihood_of_a_normal_mean():
     c = stat_profile.dispersion(lambda t: 0.5 * np.sum((fields - t[0]) ** 2, axis=1), lambda t: t[0], [x.mean()])
     assert c == pytest.approx(9 * np.var(x, ddof=1), rel=1e-3)
     assert stat_profile.drop(3, 5.0) == pytest.approx(1.96**2 / 2, rel=1e-4)
-    assert stat_profile.drop(8, 0.5, 1.1) == pytest.approx(1.1 * stats.t.ppf(0.975, 15)**2 / 2)
+    assert stat_profile.drop(8, 0.5, 1.1) == pytest.approx(1.1 * stats.t.ppf(0.975, 10)**2 / 2)
     assert stat_profile.drop(8, 3.0) == pytest.approx(3 * stats.t.ppf(0.975, 7)**2 / 2)
     assert stat_profile.interval(lambda q, _: 1 - np.exp(-q * q), 0.0, [0.0], 2.0, 0.1) == (-np.inf, np.inf)
 
