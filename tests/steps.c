@@ -9,6 +9,7 @@
 #ifndef _OPENMP // a C library for which this machine has no OpenMP
 int omp_get_max_threads(void) { return 1; }
 int omp_get_thread_num(void) { return 0; }
+int omp_get_num_threads(void) { return 1; }
 #endif
 
 enum { NX = 40, NY = 25, STEPS = 400 };
