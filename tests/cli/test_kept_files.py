@@ -38,7 +38,10 @@ from bergtow_read import RunError  # noqa: E402
 
 DEAR = b"dear to somebody"
 REFUSED = ": is there already, and was not made by these scripts; .*--force"
+
+
 def long(*call):
+    """One that make test-long alone makes."""
     return pytest.param(*call, marks=pytest.mark.slow)
 
 
