@@ -107,12 +107,13 @@ $(STAMP): FORCE
 	  echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@; }
 FORCE:
 
+# First under a name of its own: another make may be at the same.
 REV := $(BUILD)/revision.h
 $(REV): FORCE
 	@mkdir -p $(BUILD)
-	@printf '#define BT_REVISION "%s"\n#define BT_COMPILER "%s"\n#define BT_FLAGS "%s"\n' \
-	  '$(REVISION)' "$$($(CC) --version | head -1)" '$(OPT_$(CONFIG)) -ffp-contract=off' > $@.new
-	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+	@new=$@.$$$$; printf '#define BT_REVISION "%s"\n#define BT_COMPILER "%s"\n#define BT_FLAGS "%s"\n' \
+	  '$(REVISION)' "$$($(CC) --version | head -1)" '$(OPT_$(CONFIG)) -ffp-contract=off' > $$new && \
+	{ cmp -s $$new $@ && rm $$new || mv $$new $@; }
 
 $(BUILD)/%.o: %.c $(STAMP) | $(REV)
 	@mkdir -p $(@D)
@@ -130,7 +131,7 @@ VERSION := $(shell sed -n 's/^\#define BT_VERSION "\(.*\)"/\1/p' include/bergtow
 SONAME := libbergtow.so.$(firstword $(subst ., ,$(VERSION)))
 
 $(BUILD)/symbols.map: $(BUILD)/libbergtow.a install/symbols.sh $(wildcard include/bergtow/*.h)
-	@install/symbols.sh $< > $@.new && mv $@.new $@
+	@install/symbols.sh $< > $@.$$$$ && mv $@.$$$$ $@
 
 $(BUILD)/libbergtow.so.$(VERSION): $(LIB_OBJ) $(BUILD)/symbols.map
 	@echo '  LINK $@'

@@ -2,7 +2,6 @@
 """Puts tests/ on the path, so that the tests of every folder find harness.py, and says early that the program is
 missing."""
 import os
-import subprocess
 
 import harness
 import pytest
@@ -26,7 +25,4 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="session")
 def library():
     """The shared library, which the Python package loads."""
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    made = subprocess.run(["make", "--no-print-directory", "lib"], cwd=harness.ROOT, capture_output=True, text=True,
-                          env=own)
-    assert made.returncode == 0, made.stdout + made.stderr
+    harness.make("lib")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the run-level tests share: writing a case, running it, reading what it leaves, and plain polygon geometry."""
 import copy
+import fcntl
 import functools
 import json
 import os
@@ -52,6 +53,19 @@ CLOSING = {
     "solver": {"max_sweeps": 2, "position_sweeps": 0},
     "guard": {"overlap": 0},
 }
+
+
+def make(*arguments):
+    """Builds targets, and returns what make says: not as a part of the make that may have started the tests, and one at
+    a time, for tests run side by side in one tree."""
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    (ROOT / "build").mkdir(exist_ok=True)
+    with open(ROOT / "build/make.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = subprocess.run(["make", "--no-print-directory", *map(str, arguments)], cwd=ROOT, capture_output=True,
+                              text=True, timeout=600, env=own)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @functools.cache

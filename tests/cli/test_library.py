@@ -14,7 +14,21 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, DONE, ROOT, TOW, Run, call, changed, differing, environment, quick, run, write_case
+from harness import (
+    BERGTOW,
+    DONE,
+    ROOT,
+    TOW,
+    Run,
+    call,
+    changed,
+    differing,
+    environment,
+    make,
+    quick,
+    run,
+    write_case,
+)
 
 EXAMPLES = ROOT / "tests/examples"
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
@@ -22,13 +36,22 @@ CASE = changed(TOW, run__duration=10, output__frame_interval=1.7)
 WAVES = {"amplitude": 0.02, "period": 2, "direction": 30}
 
 
-def make(*arguments):
-    # not as a part of the make that may have started this test
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    result = subprocess.run(["make", "--no-print-directory", *arguments], cwd=ROOT, capture_output=True, text=True,
-                            timeout=600, env=own)
-    assert result.returncode == DONE, result.stdout + result.stderr
-    return result.stdout
+def test_makes_of_one_tree_side_by_side(tmp_path):
+    """With a compiler that names itself when all have asked, so that they come to the line that writes at once."""
+    n = 12
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"""#!/bin/sh
+        >"$0.$$"
+        while [ $(ls "$0".* | wc -l) -lt {n} ]; do sleep 0.01; done
+        echo "a compiler"
+        """)
+    compiler.chmod(0o755)
+    build = tmp_path / "build"
+    started = [subprocess.Popen(["make", "-s", f"BUILD={build}", f"CC={compiler}", build / "revision.h"], cwd=ROOT)
+               for _ in range(n)]
+    assert [s.wait(timeout=60) for s in started] == [0] * n
+    assert '"a compiler"' in (build / "revision.h").read_text()
+    assert [p.name for p in build.iterdir()] == ["revision.h"]
 
 
 def everything(folder):

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
 import json
-import os
 import subprocess
 import sys
 
 import h5py
 import numpy as np
 import pytest
-from harness import ROOT, TOW, call, changed, environment, run, script, write_case
+from harness import ROOT, TOW, call, changed, environment, make, run, script, write_case
 from python_package import bergtow, installed_by_pip
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -165,10 +164,7 @@ def test_the_wheel_has_the_command(towed, tmp_path):
 
 @pytest.mark.slow
 def test_make_install_has_the_command(towed, tmp_path):
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    made = subprocess.run(["make", "--no-print-directory", "install", f"PREFIX={tmp_path / 'usr'}"], cwd=ROOT,
-                          capture_output=True, text=True, env=own)
-    assert made.returncode == 0, made.stderr
+    make("install", f"PREFIX={tmp_path / 'usr'}")
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/bergtow-report").symlink_to(tmp_path / "usr/bin/bergtow-report")
     said = subprocess.run([tmp_path / "bin/bergtow-report", towed, "-o", tmp_path / "x.html"], capture_output=True,

@@ -10,14 +10,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, ROOT, TOW, changed, differing, environment, launcher, write_case
+from harness import BERGTOW, ROOT, TOW, changed, differing, environment, launcher, make, write_case
 
 PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test_record"
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    subprocess.run(["make", "-s", str(PROGRAM)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    make(PROGRAM)
     folder = tmp_path_factory.mktemp("run")
     done = subprocess.run([ROOT / PROGRAM, "write", folder],
                           check=True,
