@@ -46,8 +46,8 @@
 
 #include "contact/law.h"
 
-/// Its record: for each of two contact features a depth, m, and whether it is of an earlier step (1) than the last.
-extern const bt_law bt_crush_law;
+// The record of bt_crush_law: for each of two contact features a depth, m, and whether it is of an earlier step (1)
+// than the last.
 
 /// Its numbers of the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.
 enum { BT_CRUSH_PRESSURE, BT_CRUSH_LEAST };

@@ -2,7 +2,7 @@
 // Contact detection of one step: which cells are active, their margins, narrow phase, contacts with last step's
 // impulses.
 #include <math.h>
-#include <omp.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,11 +51,26 @@ static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
     return movable ? fastest : 0;
 }
 
+/// Of cell k at both velocities.
+static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals *none)
+{
+    (void)none;
+    bt_cells *t = w->cells;
+    const bt_vel *const *v = velocities;
+    const double stir = 0.5 * w->par.slop / w->par.dt;
+    double s = 0;
+    if (k == t->n - 1) return;
+    for (bt_idx i = t->cell[k].first; i < t->cell[k].end && bt_cells_moves(t, k); i++) {
+        s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[0][i]), bt_bodies_speed(w, i, &v[1][i])));
+        if (w->bodies.disturbed[i]) s = bt_max(s, stir);
+    }
+    t->speed[k] = s;
+}
+
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep)
 {
     bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
-    const double stir = 0.5 * w->par.slop / w->par.dt;
     const bt_idx n = t->n - 1;
     if (!keep) {
         for (bt_idx j = 0; j < t->n_busy; j++) {
@@ -64,17 +79,8 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         }
     }
     const bt_idx n_busy = t->n_busy; // others rest
-#pragma omp parallel for schedule(static) if (BT_MANY(n_busy, BT_FEW_CELLS))
-    for (bt_idx j = 0; j < n_busy; j++) {
-        const bt_idx k = t->busy[j];
-        double s = 0;
-        if (k == n) continue;
-        for (bt_idx i = t->cell[k].first; i < t->cell[k].end && !(t->asleep[k] && !t->awake[k]); i++) {
-            s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[i]), bt_bodies_speed(w, i, &v2[i])));
-            if (b->disturbed[i]) s = bt_max(s, stir);
-        }
-        t->speed[k] = s;
-    }
+    bt_totals none = {0};
+    bt_phases_busy(w, find_speed, (const bt_vel *const[2]){v, v2}, &none);
     double fastest = 0;
     for (bt_idx j = 0; j < n_busy; j++) {
         const bt_idx k = t->busy[j];
@@ -200,6 +206,17 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     if (bt_laws_on(&w->par)) t->overlap = bt_laws_overlap(t); // what has given way does not count as overlap
 }
 
+/// A few of the cells after each other, until no more are left; one call a thread.
+static void detect_in(bt_world *w, const bt_idx *due, bt_idx n, _Atomic bt_idx *next)
+{
+    enum { AT_ONCE = 4 };
+    thread_scratch s = {0};
+    for (bt_idx i; (i = atomic_fetch_add(next, AT_ONCE)) < n;)
+        for (bt_idx j = i; j < i + AT_ONCE && j < n; j++) narrow_phase(w, due[j], &s);
+    bt_pair_scratch_free(&s.pairs);
+    bt_pack_scratch_free(&s.pack);
+}
+
 static void wake_body(bt_world *w, bt_idx i)
 {
     bt_cells *t = w->cells;
@@ -253,13 +270,11 @@ void bt_contacts_detect(bt_world *w, bool again)
         cell->margin = margin;
         due[n_due++] = k;
     }
-#pragma omp parallel if (BT_MANY(n_due, BT_FEW_CELLS))
-    {
-        thread_scratch s = {0};
-#pragma omp for schedule(dynamic, 4)
-        for (bt_idx i = 0; i < n_due; i++) narrow_phase(w, due[i], &s);
-        bt_pair_scratch_free(&s.pairs);
-        bt_pack_scratch_free(&s.pack);
+    _Atomic bt_idx next = 0;
+    if (!BT_MANY(n_due, BT_FEW_CELLS)) detect_in(w, due, n_due, &next);
+    else {
+#pragma omp parallel
+        detect_in(w, due, n_due, &next);
     }
     free(due);
     const double t0 = bt_clock();

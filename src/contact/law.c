@@ -7,18 +7,13 @@
 #include <string.h>
 
 #include "contact/added.h"
-#include "contact/crush.h"
-#include "contact/raft.h"
 #include "partition/domain.h"
 #include "contact/row.h"
 
-static const bt_law rigid = {.name = "rigid", .what = "a contact bears any load"};
+const bt_law bt_rigid_law = {.name = "rigid", .what = "a contact bears any load"};
 
-const bt_law *const bt_laws[BT_LAWS] = {
-    [BT_LAW_RIGID] = &rigid,
-    [BT_LAW_CRUSHING] = &bt_crush_law,
-    [BT_LAW_RAFTING] = &bt_raft_law,
-};
+#define POINTER(name, law) &law,
+const bt_law *const bt_laws[BT_LAWS] = {BT_CONTACT_LAWS(POINTER)};
 
 int bt_law_first_number(int law)
 {
@@ -58,7 +53,12 @@ bool bt_laws_on(const bt_params *p)
     return false;
 }
 
-bool bt_laws_rise(const bt_params *p) { return bt_law_on(p, BT_LAW_CRUSHING); }
+bool bt_laws_rise(const bt_params *p)
+{
+    for (int law = 0; law < BT_LAWS; law++)
+        if (bt_laws[law]->rises && bt_law_on(p, law)) return true;
+    return false;
+}
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
@@ -166,8 +166,8 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
     }
     if (t->laws.n_memory > before)
         qsort(t->laws.memory, (size_t)t->laws.n_memory, sizeof *t->laws.memory, bt_memory_by_names);
-    // One maximum is what a pass carries; of other laws all that counts is in their records.
-    totals->most = bt_max(totals->most, most[BT_LAW_CRUSHING]);
+    for (int law = 0; law < BT_LAWS; law++)
+        if (bt_laws[law]->counts_contacts) totals->most = bt_max(totals->most, most[law]);
 }
 
 /// All records of this rank, also of pairs that have come to rest against each other and have no contacts.
@@ -177,9 +177,13 @@ static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *to
     for (bt_idx k = 0; k < ts->n; k++)
         for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].laws.n_memory; i++) {
             const bt_memory *r = &ts->cell[k].laws.memory[i];
-            if (r->law == BT_LAW_CRUSHING && ts->cell[k].n_contacts > 0) continue;
-            if (r->law >= BT_LAWS) bt_added_count(w, r, totals);
-            else most[r->law] = bt_max(most[r->law], bt_laws[r->law]->count(w, r, sums_of(totals, r->law)));
+            if (r->law >= BT_LAWS) {
+                bt_added_count(w, r, totals);
+                continue;
+            }
+            const bt_law *law = bt_laws[r->law];
+            if (law->counts_contacts && ts->cell[k].n_contacts > 0) continue;
+            most[r->law] = bt_max(most[r->law], law->count(w, r, sums_of(totals, r->law)));
         }
 }
 
@@ -189,7 +193,8 @@ void bt_laws_grow(bt_world *w)
     double most[BT_LAWS] = {0};
     if (bt_laws_on(&w->par)) {
         bt_phases_any_order(w, grow_cell, NULL, &t);
-        most[BT_LAW_CRUSHING] = t.most;
+        for (int law = 0; law < BT_LAWS; law++)
+            if (bt_laws[law]->counts_contacts) most[law] = t.most;
         count_records(w, most, &t);
         bt_domain_reduce(w, &t);
         bt_domain_maxima(w, most, BT_LAWS);

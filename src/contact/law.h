@@ -20,8 +20,8 @@
 //
 // A law that bounds the load of points from what their pair remembers is one source file (bergtow/contact.h,
 // contact/added.h). One that changes what touches, or whose bound rises with the approach, is one source file with its
-// bt_law, a number in the enum below and a row in bt_laws, its keys in src/case/schema.c, and a test in tests/physics.
-// Series, summary, checkpoints and texts take its numbers from its tables; the sweep is touched by neither.
+// bt_law, an entry in the list below, its keys in src/case/schema.c, and a test in tests/physics. Series, summary,
+// checkpoints and texts take its numbers from its tables; the sweep is touched by neither.
 #ifndef BERGTOW_LAW_H
 #define BERGTOW_LAW_H
 
@@ -31,8 +31,16 @@
 #include "space/phases.h"
 #include "space/cells.h"
 
-/// The program's own; laws that a program adds (bergtow/contact.h) follow from BT_LAWS on.
-enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS, BT_ALL_LAWS = BT_LAWS + BT_MAX_ADDED_LAWS };
+/// The program's own, as LAW(name, bt_law); checkpoints have their places in the list, so new ones come last.
+#define BT_CONTACT_LAWS(LAW) \
+    LAW(RIGID, bt_rigid_law) \
+    LAW(CRUSHING, bt_crush_law) \
+    LAW(RAFTING, bt_raft_law)
+
+/// Numbers of the laws: BT_LAW_RIGID and so on; laws that a program adds (bergtow/contact.h) follow from BT_LAWS on.
+#define BT_LAW_NUMBER_OF(name, law) BT_LAW_##name,
+enum { BT_CONTACT_LAWS(BT_LAW_NUMBER_OF) BT_LAWS, BT_ALL_LAWS = BT_LAWS + BT_MAX_ADDED_LAWS };
+#undef BT_LAW_NUMBER_OF
 _Static_assert((int)BT_ALL_LAWS <= (int)BT_MAX_LAWS, "each has its numbers of the case in bt_params.law_own");
 _Static_assert(BT_MAX_LAW_NUMBERS + BT_MAX_ADDED_LAWS * (1 + BT_MAX_CONTACT_NUMBERS) <= BT_MAX_TOTALS,
                "a pass adds up the numbers of all laws");
@@ -86,6 +94,10 @@ typedef struct bt_law {
     /// own[] from the case: bt_params.law_own. Not of the rigid law, as all that follows
     void (*setup)(const bt_case *c, double own[BT_MAX_CONTACT_OWN]);
     bool (*on)(const double *own);
+    bool rises; ///< some bounds have a rising part: contacts with them are not swept in batches (src/solve/batch.h)
+    /// `remember` adds a contact's record to the numbers, so that `count` is called in cells without contacts alone; of
+    /// one law at most, as a pass carries one maximum
+    bool counts_contacts;
     const bt_law_number *numbers; ///< [n_numbers]
     int n_numbers;
     const bt_law_total *totals;   ///< [n_totals], in the order of the summary
@@ -118,6 +130,9 @@ typedef struct bt_law {
     char *(*doubt)(const bt_total_value *total, double size);
 } bt_law;
 
+#define BT_LAW_DECLARED(name, law) extern const bt_law law;
+BT_CONTACT_LAWS(BT_LAW_DECLARED)
+#undef BT_LAW_DECLARED
 extern const bt_law *const bt_laws[BT_LAWS];
 
 /// Numbers of all laws of the program, one law after the other: those of law `law` from bt_law_first_number(law) on,
@@ -128,7 +143,7 @@ int bt_law_first_total(int law);
 /// Numbers of the laws from a case.
 void bt_laws_setup(const bt_case *c, bt_params *p);
 
-/// Bounds with a rising part: contacts with them are not swept in batches (src/solve/batch.h).
+/// Is a law on whose bounds rise?
 bool bt_laws_rise(const bt_params *p);
 
 /// Does any law bound contacts in this world?

@@ -61,8 +61,7 @@
 
 #include "contact/law.h"
 
-/// Its record: A*, A (m²), friction along x and y (N s).
-extern const bt_law bt_raft_law;
+// The record of bt_raft_law: A*, A (m²), friction along x and y (N s).
 
 /// Its numbers of the case, Pa/m: line load under which floes raft / thickness², 0 = they do not; pressure between
 /// sheets on each other / thickness; potential energy of sheets on each other / (area × both thicknesses). Without a

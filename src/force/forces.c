@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Free velocity of every body by the forces on it, and the rest and free drift of floes; equations in bergtow/forces.h.
 #include "force/forces.h"
-#include "base/inside.h"
 
 #include <math.h>
 
@@ -9,6 +8,7 @@
 #include "force/laws.h"
 #include "force/load.h"
 #include "space/cells.h"
+#include "space/phases.h"
 #include "base/elementary.h"
 
 /// All laws of a body: those of the list inline, those that a program has added through the table.
@@ -43,23 +43,26 @@ __attribute__((always_inline)) static inline void predict(bt_world *w, bt_idx i,
     b->vel[i] = b->vel_free[i] = u;
 }
 
-void bt_forces_predict(bt_world *w)
+static void predict_cell(bt_world *w, bt_idx k, const void *context, bt_totals *none)
 {
+    (void)context, (void)none;
     bt_bodies *b = &w->bodies;
     bt_cells *t = w->cells;
+    if (t->asleep[k] == BT_ASLEEP) return;
     const bool added = w->forces->n > BT_LISTED_LAWS;
     bt_turning r = BT_TURNING_NONE;
-#pragma omp parallel for schedule(dynamic, 16) firstprivate(r) if (BT_MANY(t->n_busy, BT_FEW_CELLS))
-    for (bt_idx j = 0; j < t->n_busy; j++) {
-        const bt_idx k = t->busy[j];
-        if (t->asleep[k] == BT_ASLEEP) continue;
-        for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
-            if (b->motion[i] != BT_DYNAMIC) b->vel_free[i] = b->vel[i];
-            else if (added) predict(w, i, true, &r);
-            else predict(w, i, false, &r);
-        }
-        if (t->asleep[k]) t->asleep[k] = BT_ASLEEP;
+    for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
+        if (b->motion[i] != BT_DYNAMIC) b->vel_free[i] = b->vel[i];
+        else if (added) predict(w, i, true, &r);
+        else predict(w, i, false, &r);
     }
+    if (t->asleep[k]) t->asleep[k] = BT_ASLEEP;
+}
+
+void bt_forces_predict(bt_world *w)
+{
+    bt_totals none = {0};
+    bt_phases_busy(w, predict_cell, NULL, &none);
 }
 
 void bt_forces_begin(bt_world *w)

@@ -107,6 +107,18 @@ static void add(contact_rows *t, const bt_body_contact *row)
     t->row[t->n++] = *row;
 }
 
+static void add_cell(const bt_world *w, const bt_impacts *m, bt_idx k, contact_rows *to)
+{
+    const bt_cell *cell = &w->cells->cell[k];
+    const bt_idx towed = bt_world_towed(w);
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
+        if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
+        const bt_body_contact t = row_of(w, m, cell, u, towed);
+        add(to, &t);
+    }
+}
+
 static int by_gid(const void *a, const void *b)
 {
     // A pair has one manifold. A floe of several parts has more: then by place.
@@ -124,22 +136,18 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     contact_rows all = {0};
-#pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_CELLS))
-    {
-        contact_rows mine = {0};
+    if (!BT_MANY(ts->n_order - from, BT_FEW_CELLS))
+        for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &all);
+    else {
+#pragma omp parallel
+        {
+            contact_rows mine = {0};
 #pragma omp for schedule(dynamic, 16)
-        for (bt_idx i = from; i < ts->n_order; i++) {
-            const bt_cell *cell = &ts->cell[ts->order[i]];
-            for (bt_idx j = 0; j < cell->n_contacts; j++) {
-                const bt_contact *u = &cell->contacts[j];
-                if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-                const bt_body_contact t = row_of(w, m, cell, u, towed);
-                add(&mine, &t);
-            }
-        }
+            for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &mine);
 #pragma omp critical
-        for (int64_t i = 0; i < mine.n; i++) add(&all, &mine.row[i]);
-        free(mine.row);
+            for (int64_t i = 0; i < mine.n; i++) add(&all, &mine.row[i]);
+            free(mine.row);
+        }
     }
     bt_body_contact *rows = all.row;
     *n = all.n;

@@ -17,7 +17,12 @@ static double own_number(const bt_world *w, const void *quantity)
     return w->stats.laws[(const bt_quantity *)quantity - own];
 }
 
-int bt_n_law_series(void) { return bt_law_first_number(BT_LAWS); }
+int bt_n_law_series(void)
+{
+    static int n; // asked for every quantity of every step
+    if (n == 0) n = bt_law_first_number(BT_LAWS);
+    return n;
+}
 
 const bt_quantity *bt_law_series(int k)
 {

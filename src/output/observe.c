@@ -8,7 +8,6 @@
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
 #include "output/observe.h"
-#include "base/inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,10 +26,13 @@
 enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
 
 /// One cell's share of the sums over contacts and floes.
-static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
+static void observe_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_cell *cell = &w->cells->cell[k];
+    const bt_cells *ts = w->cells;
+    const bt_cell *cell = &ts->cell[k];
+    const double slow2 = *(const double *)context;
+    if (!cell->own || !(k == ts->n - 1 || bt_cells_moves(ts, k) || cell->n_contacts > 0 || !ts->still)) return;
     const bt_idx towed = bt_world_towed(w);
     const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
     const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
@@ -64,23 +66,10 @@ static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t
     }
 }
 
-static bt_totals observe_cells(const bt_world *w, double slow2)
+static bt_totals observe_cells(bt_world *w, double slow2)
 {
-    const bt_cells *ts = w->cells;
     bt_totals all = {.n_sums = N_SEEN};
-#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
-    {
-        bt_totals t = {.n_sums = N_SEEN};
-#pragma omp for schedule(dynamic, 16)
-        for (bt_idx j = 0; j < ts->n_busy; j++) {
-            const bt_idx k = ts->busy[j];
-            if (ts->cell[k].own &&
-                (k == ts->n - 1 || bt_cells_moves(ts, k) || ts->cell[k].n_contacts > 0 || !ts->still))
-                observe_cell(w, k, slow2, &t);
-        }
-#pragma omp critical
-        bt_totals_merge(&all, &t);
-    }
+    bt_phases_busy(w, observe_cell, &slow2, &all);
     bt_domain_reduce(w, &all);
     return all;
 }
@@ -222,7 +211,7 @@ static void observe_rows(const bt_world *w, unsigned has, bt_sample *s)
     }
 }
 
-void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
+void bt_observe(bt_world *w, double reference_speed, bt_sample *s)
 {
     *s = (bt_sample){.time = (double)w->step * w->par.dt};
     const double slow2 = 1e-4 * reference_speed * reference_speed;

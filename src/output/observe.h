@@ -7,7 +7,7 @@
 #include "bergtow/world.h"
 
 /// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.
-void bt_observe(const bt_world *w, double reference_speed, bt_sample *s);
+void bt_observe(bt_world *w, double reference_speed, bt_sample *s);
 
 /// What the numbers of this world's samples apply to: bit 1 << k for each bt_applies k.
 unsigned bt_observe_applies(const bt_world *w);

@@ -63,7 +63,7 @@ const char *bt_balance_words(void)
 
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)
 {
-    for (int k = 0; k < bt_n_series(); k++) {
+    for (int k = 0, n = bt_n_series(); k < n; k++) {
         const bt_quantity *q = bt_series(k);
         const double x = bt_sample_value(s, q);
         if (has & 1u << q->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return q;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Guards of a run; what they look at is in guard.h.
 #include "run/guard.h"
-#include "base/inside.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -142,34 +141,36 @@ static bool beyond(const range *r, double x, double y)
     return false;
 }
 
-/// The highest ids among the bodies [first, end) into broken and gone.
-static void look_at(const bt_world *w, const range *r, bt_idx first, bt_idx end, double *broken, double *gone)
+/// The highest ids among the bodies of cell k into the maxima: what is broken, what is gone.
+static void look_at(const bt_world *w, bt_idx k, const range *r, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    for (bt_idx i = first; i < end; i++) {
+    const bt_cell *cell = &w->cells->cell[k];
+    if (!cell->own) return;
+    for (bt_idx i = cell->first; i < cell->end; i++) {
         const bt_pose *p = &b->pose[i];
         const bt_vel *v = &b->vel[i];
-        if (!isfinite(p->x + p->y + p->yaw + v->x + v->y + v->w)) *broken = bt_max(*broken, (double)b->gid[i]);
-        else if (b->motion[i] == BT_DYNAMIC && beyond(r, p->x, p->y)) *gone = bt_max(*gone, (double)b->gid[i]);
+        if (!isfinite(p->x + p->y + p->yaw + v->x + v->y + v->w)) t->most = bt_max(t->most, (double)b->gid[i]);
+        else if (b->motion[i] == BT_DYNAMIC && beyond(r, p->x, p->y)) t->most2 = bt_max(t->most2, (double)b->gid[i]);
     }
 }
 
-static bool look_at_bodies(bt_guard *g, const bt_world *w, bool all)
+/// As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
+static void look_at_moved(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_cells *ts = w->cells;
+    if (k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still) look_at(w, k, context, t);
+}
+
+static bool look_at_bodies(bt_guard *g, bt_world *w, bool all)
+{
     const range r = range_of(g, w);
-    double broken = -1, gone = -1;
-    const bt_idx n = all ? ts->n : ts->n_busy;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_CELLS))
-    for (bt_idx j = 0; j < n; j++) {
-        const bt_idx k = all ? j : ts->busy[j];
-        // As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
-        const bool moved = k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still;
-        if (ts->cell[k].own && (moved || all)) look_at(w, &r, ts->cell[k].first, ts->cell[k].end, &broken, &gone);
-    }
-    g->broken = broken;
-    g->gone = gone;
-    return broken < 0 && gone < 0;
+    bt_totals t = {.most = -1, .most2 = -1};
+    if (!all) bt_phases_busy(w, look_at_moved, &r, &t);
+    for (bt_idx k = 0; all && k < w->cells->n; k++) look_at(w, k, &r, &t);
+    g->broken = t.most;
+    g->gone = t.most2;
+    return t.most < 0 && t.most2 < 0;
 }
 
 static void body_name(const bt_guard *g, const bt_world *w, bt_gid gid, char out[40])
@@ -237,7 +238,7 @@ static bool overlap_within(const bt_guard *g, const bt_world *w, double overlap,
     return false;
 }
 
-bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_errors *err)
+bt_status bt_guard_check(bt_guard *g, bt_world *w, const bt_sample *s, bt_errors *err)
 {
     bool sound = look_at_bodies(g, w, false);
     sound = numbers_of_state(w, err) && sound;
@@ -266,7 +267,7 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }
 
-bt_status bt_guard_check_end(bt_guard *g, const bt_world *w, double overlap, bt_errors *err)
+bt_status bt_guard_check_end(bt_guard *g, bt_world *w, double overlap, bt_errors *err)
 {
     bool sound = look_at_bodies(g, w, true);
     sound = numbers_of_state(w, err) && sound;

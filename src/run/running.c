@@ -314,7 +314,7 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     bt_stall_step(&r->totals.stall, w, s->ice_resistance, s->tow_force, r->roster.mean_size);
     const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, s, err);
     // what is not has been reported, and the series hold numbers only
-    const bool writable = !bt_sample_fault(s, bt_observe_applies(w));
+    const bool writable = sound == BT_OK || !bt_sample_fault(s, bt_observe_applies(w));
     if (status == BT_OK && r->record && writable) status = bt_record_sample(r->record, s, err);
     if (status == BT_OK && r->record) status = bt_record_events(r->record, &w->events, err);
     if (status == BT_OK) status = sound;

@@ -15,6 +15,7 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from)
 {
     for (int k = 0; k < into->n_sums; k++) bt_sum_join(&into->sum[k], &from->sum[k]);
     into->most = bt_max(into->most, from->most);
+    into->most2 = bt_max(into->most2, from->most2);
 }
 
 // --- who does what ---------------------------------------------------------------------------------------------------
@@ -219,4 +220,22 @@ void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
     }
 #pragma omp parallel for schedule(static) num_threads(ts->n_shares)
     for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
+}
+
+void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
+{
+    const bt_cells *ts = w->cells;
+    const bt_idx n = ts->n_busy;
+    if (!BT_MANY(n, BT_FEW_CELLS)) {
+        for (bt_idx j = 0; j < n; j++) visit(w, ts->busy[j], context, t);
+        return;
+    }
+#pragma omp parallel
+    {
+        bt_totals own = {.n_sums = t->n_sums, .most = t->most, .most2 = t->most2};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx j = 0; j < n; j++) visit(w, ts->busy[j], context, &own);
+#pragma omp critical
+        bt_totals_merge(t, &own);
+    }
 }

@@ -34,11 +34,11 @@ enum {
     BT_FEW_CONTACTS = 700,
 };
 
-/// What a pass adds up over cells, threads and ranks: exact sums, and one maximum.
+/// What a pass adds up over cells, threads and ranks: exact sums, and maxima.
 typedef struct bt_totals {
     bt_sum sum[BT_MAX_TOTALS];
     int n_sums;
-    double most;
+    double most, most2;
 } bt_totals;
 
 void bt_totals_merge(bt_totals *into, const bt_totals *from);
@@ -62,7 +62,10 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
 /// Visit all busy cells, also those without contacts and of other ranks, for the sake of their bodies, in any order; no
-/// totals (NULL).
+/// totals (NULL). Threads are those of the sweeps.
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
+
+/// The same outside the solver: threads by the number of cells, and totals, of this rank.
+void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
 #endif

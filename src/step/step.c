@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "contact/work.h"
-#include "base/inside.h"
 #include "contact/contacts.h"
 #include "contact/row.h"
 #include "contact/law.h"
@@ -77,6 +76,28 @@ static bool at_rest(const bt_world *w, const bt_cell *t)
     return true;
 }
 
+/// The maxima: the farthest path, and how far a floe stands outside its cell, m.
+static void advance_cell(bt_world *w, bt_idx k, const void *can_sleep, bt_totals *most)
+{
+    bt_cells *ts = w->cells;
+    const bt_cell *t = &ts->cell[k];
+    const bool last = k == ts->n - 1, moves = last || bt_cells_moves(ts, k), shifted = w->solver->shifted && moves;
+    if (!moves && ts->still) return;
+    double path = 0, out = 0;
+    for (bt_idx i = t->first; i < t->end; i++) {
+        const double way = move(w, i, shifted);
+        path = bt_max(path, way);
+        if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(w, i)); // no farther than before
+    }
+    ts->moved[k] += path;
+    most->most2 = bt_max(most->most2, out);
+    if (!last) most->most = bt_max(most->most, path);
+    if (!moves || last) return;
+    if (!*(const bool *)can_sleep || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
+    // where forces have been informed, they would find what they found
+    else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
+}
+
 /// X2 = X1 + U2 Δt + D.
 static void advance(bt_world *w)
 {
@@ -86,29 +107,11 @@ static void advance(bt_world *w)
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
     const bool can_sleep = bt_forces_rest(w);
-    double farthest = 0, out = 0;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
-    for (bt_idx j = 0; j < ts->n_busy; j++) {
-        const bt_idx k = ts->busy[j];
-        const bt_cell *t = &ts->cell[k];
-        const bool last = k == ts->n - 1, moves = last || bt_cells_moves(ts, k);
-        if (!moves && ts->still) continue;
-        double path = 0;
-        for (bt_idx i = t->first; i < t->end; i++) {
-            const double way = move(w, i, w->solver->shifted && moves);
-            path = bt_max(path, way);
-            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(w, i)); // no farther than before
-        }
-        ts->moved[k] += path;
-        if (!last) farthest = bt_max(farthest, path);
-        if (!moves || last) continue;
-        if (!can_sleep || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
-        // where forces have been informed, they would find what they found
-        else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
-    }
-    ts->moved_any += farthest;
-    bt_domain_maxima(w, &out, 1);
-    ts->relabel = out > ts->allowance;
+    bt_totals t = {0};
+    bt_phases_busy(w, advance_cell, &can_sleep, &t);
+    ts->moved_any += t.most;
+    bt_domain_maxima(w, &t.most2, 1);
+    ts->relabel = t.most2 > ts->allowance;
     bt_tow_advance(w);
 }
 
@@ -118,10 +121,15 @@ enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOL
        N_BALANCE };
 
 /// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
-static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)
+static void balance_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
+    (void)context;
     const bt_bodies *b = &w->bodies;
-    const bt_cell *cell = &w->cells->cell[k];
+    const bt_cells *ts = w->cells;
+    const bt_cell *cell = &ts->cell[k];
+    if (!cell->own) return;
+    if (cell->active) bt_sum_add(&t->sum[ACTIVE], cell->end - cell->first);
+    if (k != ts->n - 1 && !bt_cells_moves(ts, k) && ts->still) return;
     for (bt_idx i = cell->first; i < cell->end; i++) {
         if (b->motion[i] != BT_DYNAMIC) continue;
         const bt_vel *v = &b->vel[i];
@@ -159,20 +167,7 @@ static void balance(bt_world *w)
     const bt_cells *ts = w->cells;
     bt_step_stats *st = &w->stats;
     bt_totals all = {.n_sums = N_BALANCE};
-#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
-    {
-        bt_totals t = {.n_sums = N_BALANCE};
-#pragma omp for schedule(dynamic, 16)
-        for (bt_idx j = 0; j < ts->n_busy; j++) {
-            const bt_idx k = ts->busy[j];
-            const bt_cell *cell = &ts->cell[k];
-            if (!cell->own) continue;
-            if (cell->active) bt_sum_add(&t.sum[ACTIVE], cell->end - cell->first);
-            if (k == ts->n - 1 || bt_cells_moves(ts, k) || !ts->still) balance_cell(w, k, &t);
-        }
-#pragma omp critical
-        bt_totals_merge(&all, &t);
-    }
+    bt_phases_busy(w, balance_cell, NULL, &all);
     for (int k = 0; bt_tow_has_line(w->tow) && ts->cell[ts->n - 1].own && k < w->tow->n_branches; k++) {
         const bt_branch *b = &w->tow->branch[k];
         bt_sum_add(&all.sum[APPLIED_X], b->lambda * b->lx);

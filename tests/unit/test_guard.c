@@ -55,7 +55,7 @@ static bt_sample sound_sample(const bt_world *w)
 }
 
 /// part: of the message, NULL = none. end: of the run, with this overlap.
-static void expect_of(bt_guard *g, const bt_world *w, const bt_sample *s, bool end, const char *part)
+static void expect_of(bt_guard *g, bt_world *w, const bt_sample *s, bool end, const char *part)
 {
     bt_errors err = {0};
     const bt_status status = end ? bt_guard_check_end(g, w, s->overlap, &err) : bt_guard_check(g, w, s, &err);
@@ -70,7 +70,7 @@ static void expect_of(bt_guard *g, const bt_world *w, const bt_sample *s, bool e
     bt_errors_free(&err);
 }
 
-static void expect(bt_guard *g, const bt_world *w, const bt_sample *s, const char *part)
+static void expect(bt_guard *g, bt_world *w, const bt_sample *s, const char *part)
 {
     expect_of(g, w, s, false, part);
 }

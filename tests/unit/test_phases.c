@@ -270,6 +270,50 @@ static void a_small_team_does_all(void **state)
     bt_world_free(w);
 }
 
+/// A sum over the cells, and the highest and the lowest, as its opposite, of their numbers.
+static void visit_busy(bt_world *w, bt_idx k, const void *visits, bt_totals *t)
+{
+    (void)w;
+    atomic_fetch_add(&((atomic_int *const *)visits)[0][k], 1);
+    bt_sum_add(&t->sum[0], k);
+    t->most = bt_max(t->most, k);
+    t->most2 = bt_max(t->most2, -(double)k);
+}
+
+static void every_busy_cell_is_visited_once(void **state)
+{
+    (void)state;
+    uint64_t rng = 9;
+    for (int threads = 1; threads <= 4; threads++) {
+        omp_set_num_threads(threads);
+        bt_world *w = fill(&scenes[0], &rng);
+        bt_cells *t = w->cells;
+        const bt_idx all = t->n_busy;
+        const bt_idx counts[] = {all, BT_FEW_CELLS + 1, BT_FEW_CELLS, 1, 0};
+        assert_true(all > 4 * BT_FEW_CELLS);
+        for (int c = 0; c < 5; c++) {
+            t->n_busy = counts[c];
+            atomic_int *visits = bt_alloc((size_t)t->n, sizeof *visits);
+            bt_totals found = {.n_sums = 1, .most = -1, .most2 = -INFINITY};
+            bt_phases_busy(w, visit_busy, &visits, &found);
+            double sum = 0, highest = -1, lowest = INFINITY;
+            for (bt_idx j = 0; j < t->n_busy; j++) {
+                sum += t->busy[j], highest = bt_max(highest, t->busy[j]), lowest = bt_min(lowest, t->busy[j]);
+                assert_int_equal(visits[t->busy[j]], 1);
+                visits[t->busy[j]] = 0;
+            }
+            for (bt_idx k = 0; k < t->n; k++) assert_int_equal(visits[k], 0);
+            CHECK_CLOSE(bt_sum_value(&found.sum[0]), sum, 0);
+            CHECK_CLOSE(found.most, highest, 0);
+            if (t->n_busy > 0) CHECK_CLOSE(found.most2, -lowest, 0);
+            else assert_true(found.most2 == -INFINITY);
+            free(visits);
+        }
+        t->n_busy = all;
+        bt_world_free(w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -277,6 +321,7 @@ int main(void)
         cmocka_unit_test(the_border_is_done_before_it_is_sent),
         cmocka_unit_test(shares_follow_the_lists),
         cmocka_unit_test(a_small_team_does_all),
+        cmocka_unit_test(every_busy_cell_is_visited_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
