@@ -648,6 +648,9 @@ MUTANTS = {
     "src/base/base.c": (["cli/test_faults.py::test_no_memory"], [
         ("    leave(BT_ERR_NUMERIC);\n", "    exit(BT_ERR_NUMERIC);\n", "HDF5 closes files from within itself"),
     ]),
+    "src/app/main.c": (["cli/test_resume.py::test_nohup"], [
+        ("    sigaction(SIGHUP, &hangup, NULL);\n    start", "    start", "a library takes SIGHUP from nohup"),
+    ]),
     "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint",
                         "cli/test_resume.py::test_by_wall_time",
                         "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint", "cli/test_resume.py"], [

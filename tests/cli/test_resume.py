@@ -12,8 +12,8 @@ import time
 import h5py
 import pytest
 
-from harness import (BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed, environment,
-                     heard, quick, run, write_case)
+from harness import (BERGTOW, CASE as REFUSED, DONE, FAULT, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed,
+                     environment, heard, quick, run, write_case)
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -31,11 +31,10 @@ def whole(tmp_path_factory):
 def begun(folder, name, *arguments, **more):
     p = subprocess.Popen([BERGTOW, "run", "case.yml", "-o", name, "--quiet", *map(str, arguments)],
                          cwd=folder,
-                         env=environment(OMP_NUM_THREADS=1),
                          stdout=subprocess.PIPE,
                          stderr=subprocess.PIPE,
                          text=True,
-                         **{"preexec_fn": heard, **more})
+                         **{"preexec_fn": heard, "env": environment(OMP_NUM_THREADS=1), **more})
     end = time.time() + 30
     while not (folder / name / "result.part.h5").exists() and time.time() < end:
         time.sleep(0.005)
@@ -71,10 +70,16 @@ def test_stopped_by_a_signal(whole, number):
     assert_same_result(one.dir, folder / name)
 
 
-def test_nohup(whole):
-    """The end of the session is ignored before the run begins, and stays so."""
+@pytest.mark.parametrize("taken", [False, True])
+@pytest.mark.parametrize("again", quick([True, False], True))
+def test_nohup(whole, again, taken):
+    """The end of the session is ignored before the run begins, and stays so, also where a library takes the signal, and
+    when the program starts itself again with settings for libgomp."""
     folder, _ = whole
-    p = begun(folder, "nohup", preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    env = environment(OMP_NUM_THREADS=1, **{"LD_PRELOAD": FAULT, "BT_FAULT_HANGUP": 1} if taken else {})
+    if again: del env["BERGTOW_STARTED"]
+    name = f"nohup{again}{taken}"
+    p = begun(folder, name, env=env, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
     p.send_signal(signal.SIGHUP)
     time.sleep(0.1)
     p.send_signal(signal.SIGTERM)

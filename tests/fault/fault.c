@@ -2,6 +2,7 @@
 // Preloaded into the program by tests: calls of the system that fail where a test says so.
 //
 //     BT_FAULT=NAME     to open or rename a file of this name, without its folder, fails as on a full disk
+//     BT_FAULT_HANGUP=1 a handler of SIGHUP, as UCX has, from the moment the libraries are loaded
 //     BT_FAULT_SIGNAL=1 SIGUSR1 arrives before the constructors of the libraries are done, and at the second start
 #include <dlfcn.h>
 #include <errno.h>
@@ -79,7 +80,10 @@ int execv(const char *path, char *const argv[])
     return real(path, argv);
 }
 
+static void handler(int number) { (void)number; }
+
 __attribute__((constructor)) static void begin(void)
 {
+    if (getenv("BT_FAULT_HANGUP")) signal(SIGHUP, handler);
     if (getenv("BT_FAULT_SIGNAL")) raise(SIGUSR1);
 }

@@ -36,12 +36,15 @@ def command(ranks, *arguments):
 
 
 def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, **more):
-    return subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
+    done = subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
                           env=environment(OMP_NUM_THREADS=1),
                           capture_output=True,
                           text=True,
                           timeout=timeout,
                           **more)
+    # prterun of Open MPI 5 puts null bytes into what it hands on when a program calls MPI_Abort
+    done.stdout, done.stderr = done.stdout.replace("\0", ""), done.stderr.replace("\0", "")
+    return done
 
 
 def ours(result):
