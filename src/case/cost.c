@@ -34,7 +34,9 @@ static const double VORONOI_CORNERS = 5.6;
 double bt_cost_floe_step(double concentration)
 {
     const double x = bt_min(0.95, bt_max(0, concentration));
-    return x < 0.5 ? 0.5e-6 * bt_pow(4, (x - 0.2) / 0.3) : 2e-6 * bt_pow(7.5, (x - 0.5) / 0.3);
+    if (x < 0.5) return 0.4e-6 * bt_pow(2, (x - 0.2) / 0.3);
+    if (x < 0.8) return 0.8e-6 * bt_pow(2.75, (x - 0.5) / 0.3);
+    return 2.2e-6 * bt_pow(3.2, (x - 0.8) / 0.15);
 }
 
 double bt_cost_seconds(const bt_case *c)
