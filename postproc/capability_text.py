@@ -142,17 +142,19 @@ def figure(found):
     kilo, newton = scale(largest, "N")
     parted = any(None in p["speed"] for c in some for p in c["points"])
     parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
-    for axes, name, label, unit in ((grid[0, 0], "speed", "speed made good, m/s", 1.0),
-                                    (grid[0, 1], "tension", f"largest line tension, {newton}", kilo)):
+    between = [c for c in some if c["makes_it"] is not None and c["does_not"] is not None]
+    for axes, name, label, unit, line in (
+            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"]),
+            (grid[0, 1], "tension", f"largest line tension, {newton}", kilo, found["breaking_load"] if parts else 0.0)):
         for c, colour in zip(some, colours * len(some)):
             if c["points"]:
                 _curve(axes, c, name, colour, factor, unit)
-            if c["makes_it"] is not None and c["does_not"] is not None:
+            if c in between:
                 axes.axvspan(factor * c["makes_it"], factor * c["does_not"], color=colour, alpha=0.10, linewidth=0)
         axes.set_xlabel(words)
         axes.set_ylabel(label)
-        axes.set_ylim(bottom=min(0.0, *(x / unit for c in some for p in c["points"] for x in p[name] if x is not None),
-                                 0.0))
+        shown = [0.0, line, *(x for c in some for p in c["points"] for x in p[name] if x is not None)]
+        axes.set_ylim(min(shown) / unit, 1.06 * max(shown) / unit or 1.0)
         axes.grid(True)
     grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
                        label=f"to be kept: {number(found['speed'])} m/s")
@@ -174,5 +176,5 @@ def figure(found):
         axes.grid(True)
     style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
                "dots: fields" + ", crosses: those whose line parted" * parted +
-               "; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
+               "; band: 95 % of their mean" + "; shaded: where the limit lies" * bool(between), left=0.15 / width)
     return fig

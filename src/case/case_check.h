@@ -43,6 +43,9 @@ void bt_case_lead_follow(bt_case *c, int n, const double *v);
 /// Checks of the lead.
 void bt_case_check_lead(const bt_check *k);
 
+/// Rows of the tables of current and wind that are closer than a step, which does not see what is between.
+void bt_case_warn_tables(const bt_case *c, bt_errors *warnings);
+
 /// Warn of a lead that drifts away from the tow with its ice, by (x, y) m in the whole run.
 void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings);
 

@@ -115,6 +115,25 @@ void bt_case_check_lead(const bt_check *k)
                        c->lead.floe_size);
 }
 
+static void warn_of_table(const bt_case *c, const char *key, const bt_table *t, bt_errors *warnings)
+{
+    int64_t n = 0, first = 0;
+    for (int64_t i = 1; i < t->n && t->row[3 * (i - 1)] < c->run.duration; i++)
+        if (t->row[3 * i] - t->row[3 * (i - 1)] < c->run.dt * (1 - 1e-9) && n++ == 0) first = i;
+    if (n > 0)
+        bt_errors_add(warnings,
+                      "%s: %lld rows follow the one before within less than a time step of %g s, the first at %g s: a "
+                      "step takes the velocity of its middle, and what changes between is not felt; lower run.dt, or "
+                      "give means over a step or longer",
+                      key, (long long)n, c->run.dt, t->row[3 * first]);
+}
+
+void bt_case_warn_tables(const bt_case *c, bt_errors *warnings)
+{
+    warn_of_table(c, "water.current_table", &c->water.table, warnings);
+    warn_of_table(c, "air.wind_table", &c->air.table, warnings);
+}
+
 // The lead is cut at time zero and goes with the ice, the planned path does not.
 void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings)
 {

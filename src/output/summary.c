@@ -279,6 +279,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 
     bt_case_warn_idle(c, &s->warnings);
+    bt_case_warn_tables(c, &s->warnings);
     bt_ice_warn_closed(c, t->ice_area, &s->warnings);
     if (t->undisturbed) bt_case_warn_lead(c, t->undisturbed->drift_x, t->undisturbed->drift_y, &s->warnings);
     warn_of_solver(s, h, c, t);

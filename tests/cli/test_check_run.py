@@ -186,3 +186,13 @@ def test_what_needs_no_size_is_not_asked_for_one(tmp_path):
     assert missing(tmp_path, changed(MAP, ice={"concentration": 0}, floes=[floe | {"thickness": 1}])) == (DONE, [])
     assert call("field", write_case(tmp_path, MAP), "-o", tmp_path / "field.h5").returncode == DONE
     assert missing(tmp_path, changed(MAP, ice={"field": "field.h5"})) == (DONE, [])
+
+
+def test_rows_of_a_table_that_no_step_sees(tmp_path):
+    rows = "t,u,v\n0,0,0\n5,0.01,0\n5.04,0.02,0\n5.08,0,0\n5.18,0,0\n40,0.01,0\n40.01,0,0\n"
+    (tmp_path / "current.csv").write_text(rows)
+    case = write_case(tmp_path, changed(TOW, water__current_table="current.csv"))
+    said = "water.current_table: 2 rows follow the one before within less than a time step of 0.1 s, the first at 5.04 s"
+    assert said in call("check", case).stdout
+    assert [w for w in run(tmp_path, case, "--steps", 5).summary["warnings"] if w.startswith(said)]
+    assert "rows follow" not in call("check", case, "--set", "run.dt=0.04").stdout
