@@ -430,6 +430,31 @@ static void check_path(const check *k, int n, const double *v)
                    way, reach, time);
 }
 
+/// Least distance of two parallel lines that have the outline between them: one of them lies along an edge of its hull.
+static double least_width(int n, const double *v)
+{
+    double hull[2 * BT_MAX_VERTICES], least = INFINITY;
+    memcpy(hull, v, 2 * sizeof *v * (size_t)n);
+    n = bt_shape_hull(n, hull);
+    for (int i = 0; i < n; i++) {
+        const double *p = hull + 2 * i, *q = hull + 2 * ((i + 1) % n), length = bt_hypot(q[0] - p[0], q[1] - p[1]);
+        least = bt_min(least, bt_shape_width(n, hull, (q[0] - p[0]) / length, (q[1] - p[1]) / length));
+    }
+    return least;
+}
+
+/// Walls that close on the body: however it turns, it needs its least width.
+static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
+{
+    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, "run.duration domain.length domain.width")) return;
+    const double left = extent - 2 * closing * k->c->run.duration, needed = least_width(n, v);
+    if (left > 0 && left < needed * (1 - 1e-9)) // 0: check_closing
+        bt_check_fault(k, key,
+                       "%g m/s leaves %g m between the walls at the end of the run, and the body is %g m wide where it "
+                       "is narrowest; slow them, or end the run after %g s",
+                       closing, left, needed, (extent - needed) / (2 * closing));
+}
+
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
@@ -528,6 +553,8 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_tow_check(&k);
     bt_case_fill_impact(c); // the reference speed goes by that of the tow
     if (placed) check_path(&k, n, v);
+    if (placed) check_squeeze(&k, "domain.ends_closing", c->domain.ends_closing, c->domain.length, n, v);
+    if (placed) check_squeeze(&k, "domain.sides_closing", c->domain.sides_closing, c->domain.width, n, v);
     bt_case_check_window(&k, n, v);
     check_water(&k);
     bt_case_check_environment(&k);
