@@ -56,9 +56,9 @@ def dispersion(minus_log_likelihoods, quantity, theta):
     return float(robust / model) if np.isfinite([model, robust]).all() and model > 0 else 1.0
 
 
-def drop(fields, c=0.0, share=1.0, level=0.95):
-    """Fall of the log-likelihood at the ends of the interval. share: variance with what the profile holds fixed over
-    that without."""
+def drop(fields, c, share=1.0, level=0.95):
+    """Fall of the log-likelihood at the ends of the interval. c: of `dispersion`; share: variance with what the profile
+    holds fixed over that without."""
     def squared(quantile):
         return quantile(0.5 + level / 2) ** 2
     if fields < LEAST_FIELDS:
