@@ -174,6 +174,8 @@ def load() -> tuple[Library, str]:
     # is loaded, and what the user has set wins.
     if "OMP_WAIT_POLICY" not in os.environ:
         os.environ.setdefault("GOMP_SPINCOUNT", "5000")
+    # UCX, which the Open MPI of Debian 13 loads, takes SIGHUP for its debugger, also from nohup.
+    os.environ.setdefault("UCX_DEBUG_SIGNO", "0")
     reasons = []
     for path in dict.fromkeys(_candidates()):
         try:

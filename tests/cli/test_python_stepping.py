@@ -413,6 +413,23 @@ def put(sim, body, x, y):
     return True
 
 
+def test_the_end_of_a_session_stays_ignored(tmp_path):
+    """Under nohup, whatever a library of MPI would like to have of the signal: UCX, on Debian 13."""
+    script = tmp_path / "nohup.py"
+    script.write_text(f"""
+import signal, sys
+sys.path.insert(0, {str(ROOT / "postproc")!r})
+signal.signal(signal.SIGHUP, signal.SIG_IGN)
+import bergtow
+with bergtow.Simulation({str(write_case(tmp_path, SHORT))!r}, threads=1) as sim:
+    sim.step(2)
+    ignored = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("SigIgn"))
+    print(int(ignored, 16) >> (signal.SIGHUP - 1) & 1)
+""")
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert result.stdout == "1\n", (result.stdout, result.stderr)
+
+
 def test_a_floe_that_is_pushed_by_hand_hits_another():
     floes = [{"shape": "square", "length": 0.8, "x": x, "y": 0} for x in (8, 10)]
     case = changed(SHORT, ice__concentration=0, tow__speed=0.01, floes=floes)
