@@ -14,7 +14,7 @@ enum {
     BT_COST_PANEL_BYTES = 32, ///< a block of the loads of one panel
 };
 
-/// Seconds a floe and step on one core, measured on cases/basin and on cases/studies/concentration.yml (AMD EPYC, 2026):
+/// Seconds a floe and step on one core, measured on cases/basin and cases/studies/concentration.yml (AMD EPYC, 2026):
 /// 0.4, 0.8, 2.2 and 7 µs at 20, 50, 80 and 95 %. Between them the logarithm is linear. A pack so large that most floes
 /// rest costs less, a closed one that jams more: the order of magnitude, no more.
 double bt_cost_floe_step(double concentration);
