@@ -446,7 +446,8 @@ static double least_width(int n, const double *v)
 /// Walls that close on the body: however it turns, it needs its least width.
 static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
 {
-    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, "run.duration domain.length domain.width")) return;
+    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, "run.duration domain.length domain.width"))
+        return;
     const double left = extent - 2 * closing * k->c->run.duration, needed = least_width(n, v);
     if (left > 0 && left < needed * (1 - 1e-9)) // 0: check_closing
         bt_check_fault(k, key,
