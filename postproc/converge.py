@@ -58,7 +58,7 @@ def slower_start(run, k):
     """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size. It
     ends well before the window."""
     first = run.value("tow.ramp")
-    own = run.value("body.length") / run.value("tow.speed")
+    own = np.ptp(run.bodies[run.towed].vertices, axis=0).max() / run.value("tow.speed")
     ramp = first * RAMP ** k if first > 0 else own * RAMP ** (k - 1)
     return {"tow.ramp": max(first, min(ramp, LATEST * run.window[0])) if run.window else ramp}
 

@@ -351,7 +351,8 @@ def _holds_for(e, case):
     if case is None:
         return ""
     said = [(case.texts[key], before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
-            for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters]
+            for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters
+            and (key != "body.length" or case.texts.get("body.shape") != "polygon")]
     still = [words for words, keys in STILL.items() if not any(key in e.parameters for key in keys)
              and all(case.texts.get(key, "none").split(" ")[0] in ("0", "none") for key in keys)]
     return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)

@@ -141,9 +141,10 @@ def by_hand(table, folder, seed, parts, number):
         body.setdefault("yaw", 0)
     tow = case["tow"]
     if value_of(case, "tow.line.branches") == 2: # by default one is fastened on each side
+        length = body.get("length") or np.ptp(np.array(body["vertices"])[:, 0])
         for at, side in ((tow, 1), (tow.setdefault("branch2", {}), -1)):
-            at.setdefault("hull_x", 0.2 * body["length"])
-            at.setdefault("hull_y", 0.1 * side * body["length"])
+            at.setdefault("hull_x", 0.2 * length)
+            at.setdefault("hull_y", 0.1 * side * length)
     write_case(folder, case, "field.yml")
     code, err = called(folder, "field", "field.yml", "-o", "field.h5")
     if code:

@@ -510,6 +510,12 @@ def idle(values):
         yield "impact.least_speed"
     if "wall" not in (values["domain.ends"], values["domain.sides"]):
         yield from ("domain.wall_friction", "domain.wall_restitution")
+    if values["body.shape"] == "polygon":
+        yield from ("body.length", "body.width")
+    if values["body.shape"] == "none":
+        yield from (key for key in list(values) if key.startswith("body.") and key != "body.shape")
+    if values["tow.mode"] == "none":
+        yield "tow.ramp"
 
 
 def draw(seed, table):

@@ -90,16 +90,22 @@ static void unbind(void)
     if (omp_get_num_places() > 0 && bt_cores_given(&all)) sched_setaffinity(0, sizeof all, &all);
 }
 
-// What the end of a session (SIGHUP) did when the program was started: nothing under nohup. UCX, which the Open MPI of
-// Debian 13 loads, takes the signal for its debugger as soon as it is loaded, and a handler does not outlast execv.
+// Disposition of SIGHUP at the start: ignored under nohup. UCX takes the signal for its debugger as soon as it is
+// loaded, in Open MPI 5 with the program and in Open MPI 4 by MPI_Init, and a handler does not outlast execv.
 static struct sigaction hangup;
+static bool hangup_known;
+
+static void give_back_hangup(void)
+{
+    if (hangup_known) sigaction(SIGHUP, &hangup, NULL);
+}
 
 // Before the constructors of any library, some of which take milliseconds; and an ignored signal stays so over the
 // second start, while a handler would not.
 static void before_libraries(void)
 {
     bt_processor_check();
-    sigaction(SIGHUP, NULL, &hangup);
+    hangup_known = sigaction(SIGHUP, NULL, &hangup) == 0;
     // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
     signal(SIGUSR1, SIG_IGN);
     // a file at its size limit is an error of the write, with a message, not the end of the program
@@ -187,9 +193,10 @@ static int bergtow(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    sigaction(SIGHUP, &hangup, NULL);
+    give_back_hangup();
     start_with_settings(argc, argv);
     if (bt_comm_start(&argc, &argv) != BT_OK) return BT_ERR_USAGE;
+    give_back_hangup();
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;
     return bt_comm_end(bergtow(argc, argv));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all of the program use of src/base/base.c and others have no use for.
+// What all of the program uses of src/base/base.c and others have no use for.
 #ifndef BERGTOW_INSIDE_H
 #define BERGTOW_INSIDE_H
 

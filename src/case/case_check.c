@@ -314,10 +314,11 @@ static bool check_body(const check *k, int *n, double *v)
 {
     const bt_case *c = k->c;
     *n = 0;
+    if (bt_check_sound(k, "body.shape body.vertices"))
+        check_polygon(k, "body.vertices", c->body.shape, c->body.n_vertices, "body.shape");
     if (c->body.shape == BT_BODY_ABSENT ||
         !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw"))
         return false;
-    check_polygon(k, "body.vertices", c->body.shape, c->body.n_vertices, "body.shape");
     if (c->body.shape == BT_BODY_SQUARE && c->body.width != c->body.length)
         bt_check_fault(
             k, "body.width",
@@ -430,7 +431,7 @@ static void check_path(const check *k, int n, const double *v)
                    way, reach, time);
 }
 
-/// Least distance of two parallel lines that have the outline between them: one of them lies along an edge of its hull.
+/// Least distance between two parallel lines that enclose the outline: one of them lies along an edge of its hull.
 static double least_width(int n, const double *v)
 {
     double hull[2 * BT_MAX_VERTICES], least = INFINITY;
@@ -443,17 +444,20 @@ static double least_width(int n, const double *v)
     return least;
 }
 
-/// Walls that close on the body: however it turns, it needs its least width.
+/// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away.
 static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
 {
-    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, "run.duration domain.length domain.width"))
+    const bt_case *c = k->c;
+    const bool open = c->domain.ends == BT_BOUND_OPEN || c->domain.sides == BT_BOUND_OPEN;
+    if (closing == 0 || open || !bt_check_sound(k, key) ||
+        !bt_check_sound(k, "run.dt run.duration domain.length domain.width domain.ends domain.sides"))
         return;
-    const double left = extent - 2 * closing * k->c->run.duration, needed = least_width(n, v);
+    const double left = extent - 2 * closing * c->run.duration, needed = least_width(n, v);
     if (left > 0 && left < needed * (1 - 1e-9)) // 0: check_closing
         bt_check_fault(k, key,
                        "%g m/s leaves %g m between the walls at the end of the run, and the body is %g m wide where it "
-                       "is narrowest; slow them, or end the run after %g s",
-                       closing, left, needed, (extent - needed) / (2 * closing));
+                       "is narrowest; slow them, or end the run after %.10g s",
+                       closing, left, needed, floor((extent - needed) / (2 * closing * c->run.dt)) * c->run.dt);
 }
 
 static void check_water(const check *k)
@@ -554,8 +558,10 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_tow_check(&k);
     bt_case_fill_impact(c); // the reference speed goes by that of the tow
     if (placed) check_path(&k, n, v);
-    if (placed) check_squeeze(&k, "domain.ends_closing", c->domain.ends_closing, c->domain.length, n, v);
-    if (placed) check_squeeze(&k, "domain.sides_closing", c->domain.sides_closing, c->domain.width, n, v);
+    if (placed && c->domain.ends == BT_BOUND_WALL)
+        check_squeeze(&k, "domain.ends_closing", c->domain.ends_closing, c->domain.length, n, v);
+    if (placed && c->domain.sides == BT_BOUND_WALL)
+        check_squeeze(&k, "domain.sides_closing", c->domain.sides_closing, c->domain.width, n, v);
     bt_case_check_window(&k, n, v);
     check_water(&k);
     bt_case_check_environment(&k);

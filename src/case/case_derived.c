@@ -148,7 +148,7 @@ double bt_case_reference_speed(const bt_case *c)
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
     u = bt_max(u, bt_case_fastest_flow(c, true));
     // A velocity that is not given is that of free drift.
-    if (!isnan(c->body.vx)) u = bt_max(u, bt_hypot(c->body.vx, c->body.vy));
+    if (c->body.shape != BT_BODY_ABSENT && !isnan(c->body.vx)) u = bt_max(u, bt_hypot(c->body.vx, c->body.vy));
     for (bt_idx i = 0; i < c->n_floes; i++)
         if (!isnan(c->floes[i].vx)) u = bt_max(u, bt_hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).

@@ -119,13 +119,15 @@ static void warn_of_table(const bt_case *c, const char *key, const bt_table *t, 
 {
     int64_t n = 0, first = 0;
     for (int64_t i = 1; i < t->n && t->row[3 * (i - 1)] < c->run.duration; i++)
-        if (t->row[3 * i] - t->row[3 * (i - 1)] < c->run.dt * (1 - 1e-9) && n++ == 0) first = i;
+        if (t->row[3 * i] - t->row[3 * (i - 1)] < c->run.dt * (1 - 1e-9) &&
+            memcmp(&t->row[3 * i + 1], &t->row[3 * i - 2], 2 * sizeof *t->row) != 0 && n++ == 0)
+            first = i;
     if (n > 0)
         bt_errors_add(warnings,
-                      "%s: %lld rows follow the one before within less than a time step of %g s, the first at %g s: a "
-                      "step takes the velocity of its middle, and what changes between is not felt; lower run.dt, or "
-                      "give means over a step or longer",
-                      key, (long long)n, c->run.dt, t->row[3 * first]);
+                      "%s: rows that change the velocity within less than a time step of %g s: %lld, the first at %g "
+                      "s: a step takes the velocity of its middle, and what changes between is not felt; lower run.dt, "
+                      "or give means over a step or longer",
+                      key, c->run.dt, (long long)n, t->row[3 * first]);
 }
 
 void bt_case_warn_tables(const bt_case *c, bt_errors *warnings)

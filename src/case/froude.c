@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "case/case_check.h"
 #include "case/case_idle.h"
 #include "case/schema.h"
 #include "case/value.h"
@@ -140,6 +141,8 @@ bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
     }
     free(was);
     free(now);
+    // It follows from where the body is, which without one is a default again.
+    if (c->domain.ends != BT_BOUND_MOVING) c->domain.ahead = bt_case_window_ahead(c);
     return bt_case_finish(c, err);
 }
 

@@ -31,7 +31,7 @@
 #include "space/phases.h"
 #include "space/cells.h"
 
-/// The program's own, as LAW(name, bt_law); checkpoints have their places in the list, so new ones come last.
+/// The program's own, as LAW(name, bt_law); checkpoints store the position in this list, so append new ones.
 #define BT_CONTACT_LAWS(LAW) \
     LAW(RIGID, bt_rigid_law) \
     LAW(CRUSHING, bt_crush_law) \

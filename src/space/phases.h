@@ -34,7 +34,7 @@ enum {
     BT_FEW_CONTACTS = 700,
 };
 
-/// What a pass adds up over cells, threads and ranks: exact sums, and maxima.
+/// What a pass adds up over cells and threads, and bt_domain_reduce over ranks (not most2): exact sums, and maxima.
 typedef struct bt_totals {
     bt_sum sum[BT_MAX_TOTALS];
     int n_sums;
@@ -65,7 +65,7 @@ void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_t
 /// totals (NULL). Threads are those of the sweeps.
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
 
-/// The same outside the solver: threads by the number of cells, and totals, of this rank.
+/// The same outside the solver: the number of cells decides on threads; totals are of this rank only.
 void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
 #endif

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from harness import CASE, DONE, IO, TOW, call, changed, reading, run, write_case
+from harness import CASE, DONE, IO, PRESS, TOW, call, changed, reading, run, write_case
 
 GB = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
 PIER = {"shape": "square", "length": 1, "x": 6, "y": 0, "fixed": True}
@@ -70,6 +70,13 @@ def test_a_file_that_has_every_key_may_have_those_without_effect(tmp_path):
         assert ("no effect" in r.stdout) == (name != "twin.yml"), r.stdout
     write_case(tmp_path, changed(case, ice__size_spread=0.3), "by_hand.yml")
     assert "ice.size_spread: has no effect" in call("check", "by_hand.yml", cwd=tmp_path).stderr
+
+
+def test_the_twin_of_a_case_without_a_body_is_a_case(tmp_path):
+    """Numbers that follow from the place of the body, which has none, are not scaled either."""
+    (tmp_path / "twin.yml").write_text(call("check", write_case(tmp_path, PRESS), "--scale", "30").stdout)
+    r = call("check", "twin.yml", cwd=tmp_path)
+    assert r.returncode == DONE and "no effect" not in r.stdout, r.stderr
 
 
 def test_floes_given_by_hand_take_their_room(tmp_path):
@@ -189,10 +196,11 @@ def test_what_needs_no_size_is_not_asked_for_one(tmp_path):
 
 
 def test_rows_of_a_table_that_no_step_sees(tmp_path):
-    rows = "t,u,v\n0,0,0\n5,0.01,0\n5.04,0.02,0\n5.08,0,0\n5.18,0,0\n40,0.01,0\n40.01,0,0\n"
+    rows = "t,u,v\n0,0,0\n5,0.01,0\n5.04,0.02,0\n5.08,0,0\n5.12,0,0\n5.22,0.01,0\n40,0.01,0\n40.01,0,0\n"
     (tmp_path / "current.csv").write_text(rows)
     case = write_case(tmp_path, changed(TOW, water__current_table="current.csv"))
-    said = "water.current_table: 2 rows follow the one before within less than a time step of 0.1 s, the first at 5.04"
+    said = ("water.current_table: rows that change the velocity within less than a time step of 0.1 s: 2, the first at "
+            "5.04 s")
     assert said in call("check", case).stdout
     assert [w for w in run(tmp_path, case, "--steps", 5).summary["warnings"] if w.startswith(said)]
-    assert "rows follow" not in call("check", case, "--set", "run.dt=0.04").stdout
+    assert "rows that change" not in call("check", case, "--set", "run.dt=0.04").stdout
