@@ -154,8 +154,8 @@ def figure(found):
         axes.set_xlabel(words)
         axes.set_ylabel(label)
         shown = [0.0, line, *(x for c in some for p in c["points"] for x in p[name] if x is not None)]
-        bands = [p[f"mean_{name}_95"][1] for c in some for p in c["points"]]
-        top = max(max(shown), min(2 * max(shown), max((x for x in bands if x is not None and np.isfinite(x)), default=0)))
+        bands = _numbers([p[f"mean_{name}_95"][1] for c in some for p in c["points"]])
+        top = max(max(shown), min(2 * max(shown), max(bands[np.isfinite(bands)], default=0.0)))
         axes.set_ylim(min(shown) / unit, 1.06 * top / unit or 1.0)
         axes.grid(True)
     grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
