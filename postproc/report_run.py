@@ -290,7 +290,7 @@ def stamp(run):
 
 
 def applies(key, case):
-    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a length of the body in its shape."""
+    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape."""
     if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
         return False
     return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
