@@ -444,12 +444,13 @@ static double least_width(int n, const double *v)
     return least;
 }
 
-/// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away.
+/// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away,
+/// and guard.overlap: 0 lets bodies into each other.
 static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
 {
     const bt_case *c = k->c;
     const bool open = c->domain.ends == BT_BOUND_OPEN || c->domain.sides == BT_BOUND_OPEN;
-    if (closing == 0 || open || !bt_check_sound(k, key) ||
+    if (closing == 0 || open || c->guard.overlap == 0 || !bt_check_sound(k, key) ||
         !bt_check_sound(k, "run.dt run.duration domain.length domain.width domain.ends domain.sides"))
         return;
     const double left = extent - 2 * closing * c->run.duration, needed = least_width(n, v);

@@ -85,18 +85,30 @@ def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
                      r.result.stderr)
 
 
-@pytest.mark.parametrize("speed, said",
-                         [(0.02, "which would be a concentration of 1.59"), (0.048, "none beside the body")])
-def test_walls_that_leave_rigid_floes_no_room_are_refused(tmp_path, speed, said):
+CLOSED = {"run": {"dt": 0.1, "duration": 100}, "domain": {"length": 10, "width": 8, "ends_closing": 0.02},
+          "ice": {"concentration": 0.9, "size": 0.8}, "body": {"length": 2.8, "x": 5, "draft": 0.4},
+          "tow": {"mode": "none"}}
+
+
+@pytest.mark.parametrize("more, said", [
+    ({}, "which would be a concentration of 1.59"),
+    ({"domain__ends_closing": 0.04, "domain__sides_closing": 0.03, "body__shape": "rectangle", "body__length": 6,
+      "body__width": 1}, "none beside the body")])
+def test_walls_that_leave_rigid_floes_no_room_are_refused(tmp_path, more, said):
     """Also where the body alone is larger than what they leave: there is no concentration then."""
-    path = write_case(tmp_path, {
-        "run": {"dt": 0.1, "duration": 100}, "domain": {"length": 10, "width": 8, "ends_closing": speed},
-        "ice": {"concentration": 0.9, "size": 0.8}, "body": {"length": 2.8, "x": 5, "draft": 0.4},
-        "tow": {"mode": "none"}})
+    path = write_case(tmp_path, changed(CLOSED, **more))
     r = call("check", path)
     assert r.returncode == CASE and f"less room than rigid floes take, {said}" in r.stderr, r.stderr
     assert call("check", path, "--set", "guard.overlap=0").returncode == DONE
     assert call("check", path, "--set", "ice.crushing.pressure=1000").returncode == DONE
+
+
+def test_walls_that_leave_the_body_no_room_are_refused_whatever_the_ice(tmp_path):
+    path = write_case(tmp_path, changed(CLOSED, domain__ends_closing=0.048, ice__crushing__pressure=1000))
+    r = call("check", path)
+    assert r.returncode == CASE and "0.4 m between the walls at the end of the run, and the body is 2.79" in r.stderr
+    assert call("check", path, "--set", "run.duration=75").returncode == DONE
+    assert call("check", path, "--set", "guard.overlap=0").returncode == DONE
 
 
 # ---- the last state ----

@@ -35,7 +35,7 @@ GREEDY = {
     "frames": ({"output__frame_interval": 1e-7}, "output.frame_interval:", "frames, at most 1000000", "lengthen it"),
     "work": ({
         "run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"},
-        "ice": {"concentration": 0.8, "size": 1}
+        "ice": {"concentration": 0.95, "size": 1}
     }, "run.duration:", "s of one core, at most 1e+10", "shorten the run"),
     "disk": ({
         "run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"},
