@@ -55,15 +55,18 @@ CLOSING = {
 }
 
 
+def without_make():
+    """The environment for a make that is no part of the one that may have started the tests."""
+    return {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+
+
 def make(*arguments):
-    """Builds targets, and returns what make says: not as a part of the make that may have started the tests, and one at
-    a time, for tests run side by side in one tree."""
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    """Builds targets, and returns what make says; one at a time, for tests run side by side in one tree."""
     (ROOT / "build").mkdir(exist_ok=True)
     with open(ROOT / "build/make.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         done = subprocess.run(["make", "--no-print-directory", *map(str, arguments)], cwd=ROOT, capture_output=True,
-                              text=True, timeout=600, env=own)
+                              text=True, timeout=600, env=without_make())
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

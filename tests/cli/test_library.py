@@ -27,6 +27,7 @@ from harness import (
     make,
     quick,
     run,
+    without_make,
     write_case,
 )
 
@@ -48,9 +49,8 @@ def test_makes_of_one_tree_side_by_side(tmp_path):
         """)
     compiler.chmod(0o755)
     build = tmp_path / "build"
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     words = ["make", "-s", f"BUILD={build}", f"CC={compiler}", build / "revision.h"]
-    started = [subprocess.Popen(words, cwd=ROOT, env=own) for _ in range(n)]
+    started = [subprocess.Popen(words, cwd=ROOT, env=without_make()) for _ in range(n)]
     assert [s.wait(timeout=60) for s in started] == [0] * n
     assert '"a compiler"' in (build / "revision.h").read_text()
     assert [p.name for p in build.iterdir()] == ["revision.h"]
