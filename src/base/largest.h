@@ -40,7 +40,7 @@ static const double BT_LEAST_CONCENTRATION = 1e-6; ///< of ice that is there at 
 static const double BT_LEAST_SIZE = 1e-3;          ///< mean diameter of the floes, m
 static const double BT_LEAST_THICKNESS = 1e-6;     ///< m
 static const double BT_MOST_RESULT_BYTES = 20e12;  ///< series and frames
-static const double BT_MOST_CORE_SECONDS = 1e10;   ///< estimated work of a run: 300 years of a core
+static const double BT_MOST_CORE_SECONDS = 3e9;    ///< estimated work of a run: 100 years of a core
 
 /// A line for each limit.
 void bt_largest_print(FILE *out);

@@ -36,7 +36,7 @@ double bt_cost_floe_step(double concentration)
     const double x = bt_min(0.95, bt_max(0, concentration));
     if (x < 0.5) return 0.4e-6 * bt_pow(2, (x - 0.2) / 0.3);
     if (x < 0.8) return 0.8e-6 * bt_pow(2.75, (x - 0.5) / 0.3);
-    return 2.2e-6 * bt_pow(3.2, (x - 0.8) / 0.15);
+    return 2.2e-6 * bt_pow(2.1, (x - 0.8) / 0.15);
 }
 
 double bt_cost_seconds(const bt_case *c)

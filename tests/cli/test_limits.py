@@ -36,7 +36,7 @@ GREEDY = {
     "work": ({
         "run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"},
         "ice": {"concentration": 0.95, "size": 1}
-    }, "run.duration:", "s of one core, at most 1e+10", "shorten the run"),
+    }, "run.duration:", "s of one core, at most 3e+09", "shorten the run"),
     "disk": ({
         "run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"},
         "output__frame_interval": 0.1
