@@ -15,8 +15,8 @@ enum {
 };
 
 /// Seconds a floe and step on one core, measured on cases/basin and cases/studies/concentration.yml (AMD EPYC, 2026):
-/// 0.4, 0.8, 2.2 and 4.6 µs at 20, 50, 80 and 95 %. Between them the logarithm is linear. A pack so large that most floes
-/// rest costs less, a closed one that jams more: the order of magnitude, no more.
+/// 0.4, 0.8, 2.2 and 4.6 µs at 20, 50, 80 and 95 %. Between them the logarithm is linear. A pack so large that most
+/// floes rest costs less, a closed one that jams more: the order of magnitude, no more.
 double bt_cost_floe_step(double concentration);
 
 /// Of a whole case with a generated field, s of one core.
