@@ -27,6 +27,7 @@ import compared
 import domain_width
 import findings
 import stat_mean
+import units
 from bergtow_read import Run, RunError, case_value, parse_case, within
 from case_file import files, section
 from case_runs import SPENT, CaseRuns, above_zero, checked, program, whole_from
@@ -113,6 +114,7 @@ class Search:
 
     runs: CaseRuns
     key: str
+    unit: str         #: of its values, SI
     least: float      #: m/s
     say: object       #: where the progress goes, None for nowhere
     widen: bool = True
@@ -122,7 +124,7 @@ class Search:
 
     def sets(self, c, value):
         """What is replaced in the case for a value, {key: value}."""
-        sets = c.sets | {self.key: value}
+        sets = c.sets | {self.key: f"{value:.12g} {self.unit}".strip()}
         if value not in c.wider:
             r = self.runs
             texts = [*r.given, *(f"{k}={v}" for k, v in sets.items())]
@@ -340,16 +342,23 @@ def main(argv=None):
     start, end = (value for _, value in ends)
     if start == end:
         raise RunError(a.search, "the range has no extent", "give --from and --to two values")
-    def number(key, text, otherwise):
-        return with_number(binary, a.case, a.set, key, text)[1] if text else otherwise
-    resolution = number(a.search, a.resolution, abs(end - start) / PARTS)
-    least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
+    unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
+    resolution = abs(end - start) / PARTS
+    if a.resolution:
+        resolution = units.number(binary, "--resolution", a.resolution, unit)
+        if not 0 < resolution <= abs(end - start):
+            raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
+                           f"give a part of {abs(end - start):.4g} {unit}".rstrip())
+    if a.speed:
+        least = units.number(binary, "--speed", a.speed, "m/s")
+        if not least > 0:
+            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep")
     last = began + 60 * a.budget
     runs = CaseRuns(a.case, folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
     layers = files(a.case)
     keep = a.keep_width or domain_width.stays({name: section(layers, name) for name in ("domain", "ice")}, replaced)
-    search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None, not keep)
+    search = Search(runs, a.search, unit, least, sys.stderr if sys.stderr.isatty() else None, not keep)
     some = conditions(a, binary, a.set, start, end, resolution)
     for k, c in enumerate(some):
         runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
@@ -360,7 +369,7 @@ def main(argv=None):
     if search.say:
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
-    unit, across = case.get(a.search, "").partition(" ")[2], (a.conditions or "").partition("=")[0].strip()
+    across = (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
     # keys whose default follows from what is varied are varied with it
     alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])

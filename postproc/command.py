@@ -143,6 +143,9 @@ def save(figure, path, force=False):
 def guarded(main):
     """Run main() and leave the program with the exit code of what happened."""
     name = Path(sys.argv[0]).name
+    for stream in (sys.stdout, sys.stderr):  # a terminal without a dash still gets its table
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
     try:
         main()
         sys.stdout.flush()

@@ -205,6 +205,9 @@ def window(study, margin):
             inside = within(t, first, end)
             rows.append((x[inside].mean(), x[inside & (t > middle)].mean(), start, middle))
         base, late, starts, middles = np.array(rows).T
+        if base.mean() == 0 or base.max() == base.sum():
+            return [{"name": "window", "key": "output.window_start", "judged": "open", "fields": n,
+                     "why": "nothing to hold the mean ice resistance against"}]
         value, interval = effect(base, late)
         row = {"name": "window", "key": "output.window_start", "unit": "s", "from": starts.mean(), "to": middles.mean(),
                "finer": "later", "quantity": "mean ice resistance", "effect": value, "interval_95": interval,

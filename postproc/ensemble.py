@@ -43,16 +43,20 @@ def member(e, m):
 
 
 def samples(e, rows, members):
-    """Every 2 tau-th sample of the steady windows of a condition: (values above zero, at most MOST_SAMPLES; share that
-    is not; all values)."""
-    every = []
-    for m in rows:
-        x, tau = e.steady(m), members[m]["tau_samples"]
-        every.append(x[::max(1, int(np.ceil(2 * tau)))] if np.isfinite(tau) else x[:0])
-    pooled = np.concatenate(every) if every else np.zeros(0)
-    above = pooled[pooled > 0]
+    """Samples of the steady windows of a condition: (all of them; how many are independent; every 2 tau-th above zero,
+    at most MOST_SAMPLES).
+
+    All fields are thinned alike, by the median of their tau. Each by its own would give a field the weight 1/tau, and
+    one that meets no ice, whose tau is that of a constant, nearly all of it.
+    """
+    every = [x for x in map(e.steady, rows) if len(x)]
+    taus = [members[m]["tau_samples"] for m in rows if len(e.steady(m)) and np.ptp(e.steady(m)) > 0]
+    taus = [tau for tau in taus if np.isfinite(tau)]
+    stride = max(1, int(np.ceil(2 * np.median(taus)))) if taus else 1
+    thinned = np.concatenate([x[::stride] for x in every]) if every else np.zeros(0)
+    above = thinned[thinned > 0]
     step = max(1, int(np.ceil(len(above) / MOST_SAMPLES)))
-    return above[::step], (1 - len(above) / len(pooled) if len(pooled) else np.nan), pooled
+    return np.concatenate(every) if every else np.zeros(0), len(thinned), above[::step]
 
 
 def estimates(e, rows, mean):
@@ -131,7 +135,8 @@ def condition(e, c, members, options):
     rows = c.finished
     means, errors = (np.array([members[m][key] for m in rows]) for key in ("mean", "se_within"))
     fields = stat_mean.between_fields(means, errors, options.error)
-    values, none, pooled = samples(e, rows, members)
+    pooled, independent, values = samples(e, rows, members)
+    none = np.mean(pooled <= 0) if len(pooled) else np.nan
     quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
     gathered, left_out = loads.gather(e, rows, options)
     out = {
@@ -142,7 +147,7 @@ def condition(e, c, members, options):
         }, "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)),
         "estimates": estimates(e, rows, fields.get("mean", np.nan)),
         "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
-            "independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
+            "independent": independent, "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
             "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
         "loads_left_out": left_out, "panels": loads.panels(e, rows)
@@ -282,6 +287,20 @@ def positive(text):
     return value
 
 
+def finite(text):
+    value = float(text)
+    if not np.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def not_below_zero(text):
+    value = finite(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is below zero")
+    return value
+
+
 def whole(text):
     value = int(text)
     if value < 1:
@@ -341,11 +360,11 @@ def main(argv=None):
                    help="return times of loads and peaks, hours of tow (default 1 10 100)")
     add_load_options(p)
     p.add_argument("--threshold",
-                   type=float,
+                   type=finite,
                    metavar="N",
                    help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
     p.add_argument("--gap",
-                   type=float,
+                   type=not_below_zero,
                    metavar="S",
                    help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
     p.add_argument("--blocks",

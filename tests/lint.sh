@@ -31,6 +31,8 @@ done
 for f in $(files '*.h'); do
     grep -q '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f" || complain "$f: no include guard BERGTOW_..._H or BT_..._H"
 done
+twice=$(files '*.h' | while read -r f; do grep -m 1 '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f"; done | sort | uniq -d)
+[ -z "$twice" ] || complain "include guards of two headers: $twice"
 python=${PYTHON:-/usr/bin/python3}
 for f in $(files '*.py'); do
     "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"

@@ -9,6 +9,7 @@ import collections
 import pathlib
 import sys
 
+EDGES = "cli/test_edges.py"
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
 PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
@@ -53,8 +54,32 @@ MUTANTS = {
         ("u->w = (inertia * u->w + dt * l->twist) * inv.i;", "u->w = (inertia * u->w) * inv.i;", "moments are lost"),
         ("(y * bx - x * by) * inv.m) /", "(y * bx + x * by) * inv.m) /", "coupled solve"),
         ("u->y = (by - x * u->w) * inv.m;", "u->y = (by + x * u->w) * inv.m;", "coupled solve, across"),
+        ("if (l->g > 0 || l->jx != 0 || l->jy != 0) {", "if (l->g > 0) {", "what is linear acts with damping alone"),
         ("((double)w->step + 0.5) * w->par.dt", "((double)w->step + 1) * w->par.dt", "forces at the end of the step"),
         ("if (law->towed_only && !b->towed) return;", "", "a tow's law on every floe"),
+    ]),
+    "src/body/bodies.h": (["physics/test_motion", EDGES,
+                          "scenes:periodic_dense,free_drift", "parallel/test_window.py"], [
+        ("const double turns = floor((x - low) / period);", "const double turns = x < low ? -1 : 1;",
+         "one period a step"),
+        ("*laps += (int32_t)turns;", "", "laps are not counted"),
+    ]),
+    "src/body/bodies.c": ([EDGES, "parallel/test_window.py", "cli/test_python_stepping.py"], [
+        ("deepest = bt_max(deepest, -bt_apart_of(", "deepest = bt_max(deepest, +bt_apart_of(", "places far from all"),
+    ]),
+    "src/step/edit.c": ([EDGES, "cli/test_python_stepping.py"], [
+        ("bt_domain_maxima(w, &found, 1);", "", "ranks disagree on a place"),
+        ("if (b->gid[j] == gid ||", "if (", "a body in its own way"),
+        ("turned[2 * k + 1] = s * v[0] + c * v[1];", "turned[2 * k + 1] = v[1];", "the outline is not turned"),
+        ("w->tow->travel_x += to[0] - p->x;", "", "the way of a body that is put elsewhere"),
+    ]),
+    "src/run/setup.c": ([EDGES, "cli/test_tow.py"], [
+        ("thick = bt_max(thick, 1.1 * w->bodies.radius[i]);", "", "walls end at the seam"),
+        ("high[k] = (int64_t)floor((bt_max(way[k], 0)", "high[k] = 0 * (int64_t)floor((bt_max(way[k], 0)",
+         "piers ahead of the first lap"),
+    ]),
+    "src/run/study_values.c": ([EDGES, "cli/test_check_study.py", "cli/test_budget.py"], [
+        ("kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;", "true;", "radians as degrees"),
     ]),
     "src/force/forces.c": (DRAG + ["unit/test_cells"], [
         ("{1 / (m + dt * a.g), 1 / (inertia + dt * a.gw)};", "{1 / m, 1 / (inertia + dt * a.gw)};", "explicit mass"),
@@ -245,7 +270,8 @@ MUTANTS = {
         ("if (parts) merge(w, t, &s->pack);", "", "points of two parts count twice"),
         ("bt_domain_maxima(w, &any, 1);\n    return any > 0;", "return any > 0;", "ranks disagree on a repeat"),
         ("if (w->bodies.disturbed[i]) s = bt_max(s, stir);", "", "a shifted floe outruns its margin"),
-        ("2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w)", "false", "a fast floe outruns all margins"),
+        ("2 * w->par.dt * t->bound[k] > bt_margin_most(w)", "2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w)",
+         "fast floes outrun all margins"),
         ("bt_domain_tell_cells(w, t->speed, spread);", "", "speeds of other ranks"),
         ("if (movable) t->bound[n] = bt_max(t->bound[n], fastest);", "", "the body does not see fast floes"),
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
@@ -378,7 +404,8 @@ MUTANTS = {
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
         ("b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;", "", "shifted floes are taken for quiet"),
-        ("if (x >= low + period) return ++*lap, x - period;", "", "floes leave the periodic domain"),
+        ("p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);", "p->x += dx;",
+         "floes leave the periodic domain"),
         ("w->tow->travel_y += dy;", "", "way of the body across"),
         ("b->radius[i] * fabs(turn)", "0 * fabs(turn)", "turning adds no path"),
         ("|| b->vel[i].w != 0)", ")", "a turning floe sleeps"),
@@ -402,7 +429,6 @@ MUTANTS = {
          "sign > 0 ? ceil((v->rear - x) / v->length) : ceil((-x - v->rear) / v->length)",
          "copies of a window that goes backwards"),
         ("late > 0 && floe_at", "floe_at", "floes are renewed before their time"),
-        ("if (x >= low + period) x -= period, ++*turns; // rounding", "// rounding", "a place on the rim"),
         ("> slop) blocked[k] = 1;", "> 100 * slop) blocked[k] = 1;", "floes are put upon others"),
         ("bt_domain_maxima(w, blocked, (int)n);", "", "ranks disagree on free places"),
         ("more = more || (blocked[k] > 0 && !list[k].stays);", "", "no second look at what stays"),
@@ -438,7 +464,11 @@ MUTANTS = {
         ("bt_atan2(q[1] - q[-1], q[0] - q[-2])", "c->tow.direction", "legs after the first"),
         ("if (!worst.key || narrower(&a, &worst)) worst = a;", "if (!worst.key) worst = a;", "the first pair decides"),
     ]),
-    "src/output/summary.c": (["unit/test_summary"], [
+    "src/output/summary.c": (["unit/test_summary", EDGES], [
+        ("straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);", "",
+         "width across the first leg"),
+        ("in->turns = turns;", "", "a turn in the window is held against estimates"),
+        ("straight.tow.speed = (to - from) / (s->end - s->start);", ";", "the largest speed of the programme"),
         ("    if (adrift) {", "    if (false) {", "estimates of a body that nothing tows"),
         ("in->along = ice[0], in->speed", "in->speed", "the speed ordered"),
         ("return s->window.met_no_ice ? NAN : s->ice.mean;", "return s->ice.mean;", "0 held against an estimate"),

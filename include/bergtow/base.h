@@ -61,15 +61,16 @@ typedef struct bt_text {
     FILE *out; ///< to here
     char *text;
     size_t size;
+    void *locale;
 } bt_text;
-/// Open t->out, to write to.
+/// Open t->out, to write to. Until bt_text_end numbers have a decimal point in this thread, whatever its locale.
 void bt_text_begin(bt_text *t);
 /// Close it. Returns the text, which the caller frees.
 char *bt_text_end(bt_text *t);
 
 /// Copy of a text; the caller frees it.
 char *bt_text_copy(const char *text);
-/// A text as printf makes it; the caller frees it.
+/// A text as printf makes it, with a decimal point in its numbers; the caller frees it.
 char *bt_text_of(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 
 /// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).

@@ -259,12 +259,15 @@ typedef struct bt_case {
     struct {
         char *client, *project, *author, *revision; ///< for the title block of reports
     } report;
-    double extra[BT_EXTRA_KEYS]; ///< values of keys that are added to the table, those of force laws (forces.h), SI
+    /// [k] values of keys that were added to the table (bt_keys_add: of force laws, of contact laws and of sections of
+    /// a program), SI, in the order of their addition
+    double extra[BT_EXTRA_KEYS];
 } bt_case;
 
 /// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to
 /// err with file, line, key and remedy.
-/// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// overrides: [n] texts "key=value" that replace the file's values. *c is overwritten, not released before; after an
+/// error, too, it is to be released with bt_case_free. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
 
 /// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of
@@ -281,7 +284,7 @@ bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, cons
 bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,
                             const bt_table *wind, bt_errors *err);
 
-/// All defaults, for tests and programs that build a case in memory.
+/// All defaults, for tests and programs that build a case in memory. *c is overwritten, not released before.
 void bt_case_defaults(bt_case *c);
 
 /// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
@@ -303,11 +306,11 @@ bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
 /// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
 char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
-/// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0
-/// without body.
+/// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count, 0
+/// without body and for an outline that is refused.
 int bt_case_waterline(const bt_case *c, double *v);
 
-/// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count.
+/// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count.
 int bt_case_floe_outline(const bt_floe_def *f, double *v);
 
 /// Mass of the towed body without added mass, kg.

@@ -28,7 +28,9 @@ typedef struct bt_law_contact {
     bt_idx a, b;              ///< indices into w->bodies; gid[a] < gid[b]
     const double *own;        ///< [BT_MAX_CONTACT_OWN] numbers of the law
     int n;                    ///< contact points, 1 or 2
-    double gap[2];            ///< at the start of the step, m: of the outlines; after `bound` with what it has given
+    /// at the start of the step, m. In `bound`: of the outlines, with what laws that were registered later have given;
+    /// in `remember`: with what all laws have given
+    double gap[2];
     double length;            ///< between two points that take part, along the tangent, m; 0 with one of them
     double value[4];          ///< what the pair remembers; all 0 where it remembers nothing yet
     // after the solve; 0 before
@@ -65,9 +67,9 @@ typedef struct bt_contact_law {
     /// load[i]: the most that point i bears in this step, N, INFINITY before; given[i]: by how much what
     /// stood at point i has receded, m, 0 before: the bodies meet when they overlap by that
     void (*bound)(const bt_law_contact *t, double load[2], double given[2]);
-    /// After the solve, of contacts in cells at work: t->value for the next step, from load and grown; adds to the
-    /// numbers that are no state. Does the pair remember anything? It does so until the outlines part by a tenth of
-    /// the mean floe size. NULL = never
+    /// After the solve, for each contact in cells at work: set t->value for the next step from load and grown, and add
+    /// to the numbers that are no state. Returns true when the pair has something to remember; that is kept until the
+    /// outlines part by a tenth of the mean floe size. NULL = never
     bool (*remember)(bt_law_contact *t, double *number);
     /// What one pair that remembers adds to the numbers that are a state. NULL = nothing
     void (*count)(const double value[4], const double *own, double *number);

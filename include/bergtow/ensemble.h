@@ -23,8 +23,8 @@
 // and within a field a Latin hypercube in the order of its conditions, so that it leaves a random sample of them.
 // (Rejected: a counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it
 // on every network.) A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are
-// removed. One whose process died is tried again after all others, and given up
-// after some attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies
+// removed. One whose process died is tried again after all others, and given up after some
+// attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies
 // takes all others with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members
 // are run one at a time, so that only the one at fault goes on to the limit. (Not from the first on: a job that ends
 // with its time limit leaves as many such members as it had groups.)

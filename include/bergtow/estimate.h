@@ -20,12 +20,11 @@
 //                                                         a heavy disc, R = W/2, without friction and drag (derived;
 //                                                         tests/physics/test_resistance.c)
 //   ships in pack    F = ½ k Fr_p^b ρ_i W h V² A^n,  Fr_p = V/√(g h A): a regression of ship resistance in pack ice
-//                    over the pack-ice Froude number [Colbourne 2000:
-//                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in
-//                    PolarRoute, the route planner of the British Antarctic Survey (class SDA, ice_resistance;
-//                    antarctica/PolarRoute, 2022). A berg is taken as blunt, the range goes to slender. The source
-//                    gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says
-//                    extrapolated
+//                    over the pack-ice Froude number [Colbourne 2000: the form; not at hand]. Hulls: blunt k 16.1,
+//                    b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in PolarRoute, the route planner of the British
+//                    Antarctic Survey (class SDA, ice_resistance; antarctica/PolarRoute, 2022). A berg is taken as
+//                    blunt, the range goes to slender. The source gives no range of A, h, V or floe size; the numbers
+//                    are of ships: for any other body the note says extrapolated
 //   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no
 //                    ice resistance
 //
@@ -33,7 +32,9 @@
 // floe in free drift (series speed_through_ice, leeway_through_ice); for the open water less that of the water. So a
 // vessel that cannot hold its speed counts, and wind that drives the ice along. Before a run ΔV is what is ordered:
 // V_tow − U, where U of the water is its mean over the run, and of the ice its free drift at the start, or the water's
-// where wind or current change (bt_estimate_ordered).
+// where wind or current change (bt_estimate_ordered). The course, and the width of the body across it, are those of the
+// window, before a run those of the first leg; the ordered speed is the mean of the programme over the window, before a
+// run the largest.
 //
 // Left out. The other regression that is known here, R = a ρ_i W h V² A^1.5 / Fr^b [Huang et al. 2021], has constants
 // of a ship and its floes that were found only in the source of a third, without range. It stays out until the paper is
@@ -84,6 +85,7 @@ typedef struct bt_estimate_input {
     double speed, along;     ///< |ΔV| and ΔV·d through the ice, m/s; NaN: nothing is towed
     double water_speed, water_along; ///< the same through the water
     double ordered;          ///< ΔV·d if the body kept the speed that the tow asks for, m/s; NaN: nothing is towed
+    bool turns;              ///< the course changes within the window of the run: no run is held against estimates
     double restitution;      ///< e, ice on body
     bool ship;               ///< the body is a ship
     double ice_density, water_density; ///< kg/m³

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The ice field at time zero: floes as convex polygons with pose and thickness; made from a seed, or read back.
+// The ice field at time zero: floes as polygons with pose and thickness; made from a seed, or read back.
+// They are convex, unless a field was read with `ice.nonconvex: split`.
 #ifndef BERGTOW_FIELD_H
 #define BERGTOW_FIELD_H
 
@@ -56,7 +57,8 @@ void bt_field_init(bt_field *f);
 /// Release what a field holds; f itself is the caller's.
 void bt_field_free(bt_field *f);
 
-/// Append one floe; vertices [nv][2] are moved so that their centroid is the origin and (x, y) is shifted with them.
+/// Append one floe; vertices v [nv][2] m are moved so that their centroid is the origin, and (x, y) m is shifted with
+/// them; yaw rad, thickness m. Nothing is checked: nv is 3 to BT_MAX_VERTICES, anticlockwise, and f is initialised.
 void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness);
 
 /// Make the field of a case from its seed: tessellate, shrink to the asked concentration, shake to a random state,

@@ -16,8 +16,7 @@
 //   tilt       U += −(m/M) g ∇η Δt; with tilt: dynamic U += dU_w/dt Δt beyond that balance
 //   skin drag  M dU/dt = ρ C_s A |v| v, v = U_ref − U;   I dω/dt = −(ρ_w C_ws + ρ_a C_as) ∫r³dA |ω| ω
 //   form drag  dF = ½ρ C d |v| v max(0, −v̂·n) dl = ½ρ C d v max(0, −v·n) dl along the convex hull of the outline, and
-//              its moment r×dF, with the
-//              local velocity v = U_ref − U − ω×r: water over the draft, air over the sail
+//              its moment r×dF, with the local velocity v = U_ref − U − ω×r: water over the draft, air over the sail
 //
 // Added mass. Water that goes along with a body moves relative to water that has Coriolis and slope in balance: neither
 // acts on it, so that a body drifts with a geostrophic current whatever its added mass, m f k×(U − U_b) = 0. In a
@@ -108,7 +107,7 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
 /// takes such ice in; elsewhere it counts as going with the water, in the speed through the ice.
 typedef struct bt_force_body {
     const bt_params *par;      ///< Δt, current, wind of the step
-    const double *own;         ///< numbers of the law
+    const double *own;         ///< [BT_MAX_FORCE_OWN] numbers of the law
     const void *context;       ///< of the law
     const bt_drag *drag;
     bt_vel vel;                ///< U1, m/s, rad/s
@@ -143,7 +142,7 @@ typedef struct bt_force_law {
     const char *name;          ///< lower_snake; its series is NAME_force
     /// one line, "drag of water": the description of the series goes on "on the towed body against the tow direction"
     const char *doc;
-    const char *part_of;       ///< the law is counted in the series PART_OF_force, too; NULL = in its own alone
+    const char *part_of;       ///< the law is recorded in the series PART_OF_force, in place of its own; NULL = its own
     bool turns_only;           ///< it has a moment and no force: no series of its own
     bool towed_only;           ///< it acts on the towed body alone: add is not called for others
     /// [n_keys] own[k] is the value of the k-th; they are read, checked, listed and written as all others
@@ -155,10 +154,13 @@ typedef struct bt_force_law {
     /// once a step. NULL = never, which is right for every law, and costs the time that floes at rest save. Not asked
     /// of towed_only.
     bool (*rests)(const bt_params *p, const double *own);
+    /// Add to *l what the law does to body b in this step. Called for every body in every step, by several threads at
+    /// once: it must change nothing but *l. Required.
     void (*add)(const bt_force_body *b, bt_load *l);
     /// Once a step, by one thread, when all bodies have their places: for what a law needs of all of them together. It
     /// may set own[]; when its `rests` then turns to no, floes at rest are woken. NULL = done, otherwise why it failed:
-    /// the run ends after this step. NULL in place of the function = nothing to do.
+    /// the run ends after this step. NULL in place of the function = nothing to do. Of registered laws only, not of
+    /// those in src/force/laws.h; so is `context`.
     const char *(*begin)(const bt_world *w, double own[BT_MAX_FORCE_OWN], void *context);
     void *context;             ///< handed to `begin`, and to `add` in the body
 } bt_force_law;
@@ -169,7 +171,8 @@ extern int bt_n_force_laws;
 
 /// Add a law to the table, for a program that uses the library: before it reads a case or makes a world (a world has
 /// the laws that were there when it was made), and from one thread. On all ranks alike. The law and its texts remain
-/// the caller's and must stay where they are to the end of the program. Not 0 = refused: reason and remedy in err.
+/// the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE, with reason and remedy in
+/// err: a name that is taken or none, no `add`, no `doc`, more than BT_MAX_FORCE_OWN keys, a table that is full.
 bt_status bt_force_register(const bt_force_law *law, bt_errors *err);
 
 /// A series of forces: of one law, or the sum of those that are part_of it.
@@ -199,7 +202,7 @@ typedef struct bt_forces {
     /// in this step or before: a checkpoint names the added laws that have. Applied forces (bergtow/applied.h) act from
     /// the first step with a row that is not 0, all other laws always.
     bool acted[BT_MAX_FORCE_LAWS];
-    double own[BT_MAX_FORCE_LAWS][BT_MAX_FORCE_OWN];
+    double own[BT_MAX_FORCE_LAWS][BT_MAX_FORCE_OWN]; ///< [law][number]
     /// as really used by the step: what is implicit with U2; their sum with those of contacts and line is M (U2 − U1),
     /// I (ω2 − ω1)
     bt_impulse law[BT_MAX_FORCE_LAWS];

@@ -17,17 +17,20 @@ typedef struct bt_law_key {
     const char *name;          ///< after the name of the law or section: the key is NAME.name
     /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m"; "" = a plain number
     const char *unit;
-    /// "0 N", "[0, 1e9]" (least and most of a bare number): the law should do nothing by its presets
+    /// "0 N", "[0, 1e9]": the law should do nothing by its presets. The range is least and most of a number that is
+    /// written without a unit; such a number is in `unit`, but in degrees (a second) for rad (rad/s)
     const char *preset, *range;
     const char *doc;           ///< one sentence
 } bt_law_key;
 
 /// Add keys SECTION.name, before any case is read and from one thread; laws do so by their own registration. They are
 /// read, checked, listed by --list-keys, written to the resolved case and scaled as all others. False where some were
-/// refused: reason and remedy in err. The texts must stay where they are.
+/// refused: reason and remedy in err. The texts must stay where they are. A program can add BT_EXTRA_KEYS keys, those
+/// of laws included.
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err);
 
-/// own[k]: value of the k-th in SI units.
+/// own [n]: value of the k-th in SI units. The keys have been added (bt_keys_add) before c was read; anything else is
+/// undefined.
 void bt_keys_values(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own);
 
 #ifdef __cplusplus

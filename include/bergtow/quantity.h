@@ -60,7 +60,8 @@ typedef struct bt_quantity {
     /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank,
     /// with the same result.
     double (*of_world)(const bt_world *w, const void *context);
-    /// The share of one floe. The sum over all floes is exact: the same bits on any number of ranks and threads.
+    /// The share of one floe that can move: of fixed floes, walls and the towed body nothing is asked. The sum over all
+    /// is exact: the same bits on any number of ranks and threads.
     double (*of_floe)(const bt_world *w, bt_idx floe, const void *context);
     const void *context;     ///< of the functions
     size_t offset;           ///< of its place in bt_sample; set for a registered one

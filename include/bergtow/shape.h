@@ -34,8 +34,8 @@ bt_moments bt_shape_extent(int n, const double *v);
 /// repeated vertices. The text is a static string that completes "... is refused: ".
 const char *bt_shape_fault(int n, const double *v);
 
-/// The same with more patience: true only for what rounding cannot have made of a sound outline that was centred,
-/// shrunk or cut.
+/// True when a polygon is faulty by more than rounding can have made of a sound outline that was centred, shrunk or
+/// cut: a looser test than bt_shape_fault.
 bool bt_shape_broken(int n, const double *v);
 
 /// Move the centroid to the origin, in place; returns what bt_shape_extent found before the move.

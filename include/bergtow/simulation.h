@@ -114,7 +114,7 @@ typedef enum {
     BT_BODY_DRAG,      ///< 5: skin and form drag of the water, of the air, drag as it turns (bt_drag)
     BT_BODY_KINDS
 } bt_body_numbers;
-extern const int bt_body_widths[BT_BODY_KINDS];
+extern const int bt_body_widths[BT_BODY_KINDS]; ///< [kind] numbers a body, as in the list above
 
 /// One kind of numbers of all bodies, out: [bodies][bt_body_widths[kind]]. Errors: BT_ERR_USAGE.
 bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out);

@@ -42,9 +42,9 @@ void bt_stats_quarters(const double *x, int64_t n, double quarter[4]);
 
 enum { BT_STATS_STARTS = 4096 }; ///< starts of a window that are looked at, at most
 
-/// Steps between the starts of a window that are looked at in n samples: 5, twice that as often as it takes to have at
-/// most BT_STATS_STARTS of them. What needs a sum between any two starts so takes bounded memory, and a start of a long
-/// series is put off by n / BT_STATS_STARTS at most.
+/// Step between the starts of a window that are tried in n samples: 5, doubled until at most BT_STATS_STARTS starts are
+/// left. So sums between any two starts take bounded memory, and the start found is late by n / BT_STATS_STARTS at
+/// most.
 int64_t bt_stats_start_step(int64_t n);
 
 /// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the

@@ -118,8 +118,8 @@ typedef struct bt_bodies {
     bt_gid n_global;
 } bt_bodies;
 
-/// Contact laws, those beside the program's own, and what one of these may have (contact.h); numbers that the program's
-/// own may form.
+/// Most contact laws, the program's own included; most that are added (contact.h); numbers `own` of one law; numbers
+/// that one added law may form; numbers that all of the program's own laws form together.
 enum {
     BT_MAX_LAWS = 8, BT_MAX_ADDED_LAWS = 3, BT_MAX_CONTACT_OWN = 8, BT_MAX_CONTACT_NUMBERS = 4, BT_MAX_LAW_NUMBERS = 12
 };
@@ -162,8 +162,8 @@ struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
 
-/// Where the wall time of a run goes: X(name, what is in it). The last has come to these later than checkpoints
-/// without it.
+/// Where the wall time of a run goes: X(name, what is in it). The last was added later: older checkpoints do not have
+/// it.
 #define BT_WALL_PHASES(X)                                                                                              \
     X(detect, "labels and storage of bodies, margins, the detection of contacts")                                      \
     X(colour, "the order of the cells by their colours, and their distribution to threads")                            \
@@ -234,7 +234,8 @@ bt_world *bt_world_create(const bt_params *p);
 void bt_world_free(bt_world *w);
 
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
-/// is copied.
+/// is copied. Asserted, not checked: 3 to BT_MAX_VERTICES vertices, of an outline that bt_shape_fault (with parts:
+/// bt_outline_fault) accepts; mass and inertia > 0 of a dynamic body; a world that is not yet distributed to ranks.
 bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
 
 /// Number of vertices of the outline of body i.

@@ -56,4 +56,4 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
         record = Path(there) / "record.json"
         text = _call("outlines.py", map, "-o", file, "--record", record, *(["--force"] if replace else []), *words)
         text = text.replace(f"{record}\n", "")
-        return Outlines(Path(map), Path(file), json.loads(record.read_text()), text, words)
+        return Outlines(Path(map), Path(file), json.loads(record.read_text(encoding="utf-8")), text, words)

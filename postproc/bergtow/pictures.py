@@ -151,7 +151,7 @@ def statistics(ensemble: Of, **options: Any) -> dict[str, Any]:
     of ensemble.py, as time_scale=10, hours=[1, 10], exclude="jammed". Members that are missing are named in "holes"."""
     with tempfile.TemporaryDirectory() as there:
         _call("ensemble.py", _folder(ensemble), "-o", there, "--partial", *_words(options))
-        return json.loads((Path(there) / "statistics.json").read_text())
+        return json.loads((Path(there) / "statistics.json").read_text(encoding="utf-8"))
 
 
 def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool = False, **options: Any) -> Path:

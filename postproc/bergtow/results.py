@@ -30,7 +30,7 @@ class Result:
         """summary.json as a dictionary."""
         path = self.folder / "summary.json"
         try:
-            return json.loads(path.read_text())
+            return json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise BergtowError(f"{path}: is not there: the run has not ended; go on with it by `bergtow resume "
                                f"{self.folder}`", IO) from None
@@ -196,7 +196,7 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     attributes = {name: _text(value) for name, value in file.attrs.items()}
     summary = path.with_name("summary.json")
     if summary.exists():
-        attributes["summary"] = summary.read_text()
+        attributes["summary"] = summary.read_text(encoding="utf-8")
     coordinates = "time", "frame_time", "collision_time", "event_time", "other_body_name"
     dataset = xarray.Dataset(variables, attrs=attributes).set_coords([n for n in coordinates if n in variables])
     dataset.set_close(file.close)

@@ -48,7 +48,9 @@ static void print_table(const options *o, const bt_case *c, const bt_estimate_in
     printf("ice                  concentration %.4g, thickness %.4g m, floe radius %.4g m (means weighted with area), "
            "density %.4g kg/m3\n",
            in->concentration, in->thickness, in->floe_radius, in->ice_density);
-    printf("body                 %.4g m across the tow, %.4g m/s through the ice\n", in->width, in->along);
+    printf("body                 %.4g m across the tow%s, %.4g m/s through the ice%s\n", in->width,
+           c->tow.n_waypoints > 1 ? " on the first leg" : "", in->along,
+           c->tow.n_programme > 0 ? " at most" : "");
     printf("ice strength         P = %.4g N/m, captures a berg from P_s = %.4g N/m (length scale %g)\n",
            bt_estimate_strength(in), in->p_s, in->length_scale);
     printf("kappa, phi           %g (%g to %g), %g\n\n", c->estimate.kappa, c->estimate.kappa_low,

@@ -3,6 +3,7 @@
 #include "bergtow/base.h"
 #include "base/inside.h"
 
+#include <locale.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,15 +62,25 @@ void *bt_alloc_aligned(size_t n, size_t size)
     return memset(p, 0, total);
 }
 
+void *bt_point_begin(void)
+{
+    static locale_t locale; // a race here makes two equal locales and leaks one
+    if (!locale) locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    return uselocale(locale);
+}
+
+void bt_point_end(void *before) { uselocale(before); }
+
 void bt_text_begin(bt_text *t)
 {
-    *t = (bt_text){0};
+    *t = (bt_text){.locale = bt_point_begin()};
     t->out = open_memstream(&t->text, &t->size);
     if (!t->out) out_of_memory(1, BUFSIZ);
 }
 
 char *bt_text_end(bt_text *t)
 {
+    bt_point_end(t->locale);
     const bool lost = ferror(t->out) != 0;
     if (fclose(t->out) != 0 || lost) out_of_memory(1, t->size);
     return t->text;
@@ -84,7 +95,10 @@ char *bt_text_copy(const char *text)
 static char *text_of(const char *fmt, va_list ap)
 {
     char *text = NULL;
-    if (vasprintf(&text, fmt, ap) < 0) out_of_memory(1, strlen(fmt));
+    void *locale = bt_point_begin();
+    const int n = vasprintf(&text, fmt, ap);
+    bt_point_end(locale);
+    if (n < 0) out_of_memory(1, strlen(fmt));
     return text;
 }
 

@@ -11,6 +11,11 @@
 #define BT_MANY(n, few) ((n) > (few))
 #endif
 
+/// Numbers of this thread are written and read with a decimal point from here on, whatever the locale of the program
+/// that uses the library. Returns what bt_point_end takes to restore it; such pairs may lie within each other.
+void *bt_point_begin(void);
+void bt_point_end(void *before);
+
 /// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));
 

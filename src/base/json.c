@@ -6,6 +6,8 @@
 // has no number for NaN. What would be left of this file to work around that is no shorter than it.
 #include "base/json.h"
 
+#include "base/inside.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -103,10 +105,12 @@ void bt_json_number(bt_json *j, const char *key, double value)
 {
     member(j, key);
     char text[40] = "null";
+    void *locale = bt_point_begin();
     for (int digits = 15; isfinite(value) && digits <= 17; digits++) {
         snprintf(text, sizeof text, "%.*g", digits, value);
         if (strtod(text, NULL) == value) break;
     }
+    bt_point_end(locale);
     puts_(j, text);
 }
 
@@ -128,12 +132,14 @@ void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *value
 {
     member(j, key);
     puts_(j, "[");
+    void *locale = bt_point_begin();
     for (int64_t i = 0; i < n; i++) {
         char text[40] = "null";
         if (isfinite(values[i])) snprintf(text, sizeof text, "%.7g", values[i]);
         if (i) puts_(j, ", ");
         puts_(j, text);
     }
+    bt_point_end(locale);
     puts_(j, "]");
 }
 

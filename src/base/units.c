@@ -5,23 +5,17 @@
 // as 30·0.001 it may not be: a case in millimetres then gives the same bits as the same case in metres.
 #include "base/units.h"
 
+#include "base/inside.h"
 #include "bergtow/base.h"
 
 #include <ctype.h>
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    const char *symbol;
-    bt_unit kind;
-    double up, down;
-} unit;
-
 // The first unit of a kind is the SI one. ft: the international foot, 0.3048 m; tf: 1000 kg under standard gravity.
-static const unit units[] = {
+static const bt_unit_entry units[] = {
     {"%", BT_UNIT_RATIO, 1, 100},
     {"m", BT_UNIT_LENGTH, 1, 1}, {"km", BT_UNIT_LENGTH, 1000, 1}, {"cm", BT_UNIT_LENGTH, 1, 100},
     {"mm", BT_UNIT_LENGTH, 1, 1000}, {"nmi", BT_UNIT_LENGTH, 1852, 1}, {"ft", BT_UNIT_LENGTH, 3048, 10000},
@@ -77,12 +71,11 @@ double bt_units_froude(bt_unit kind) { return kinds[kind].froude; }
 const char *bt_units_symbol(bt_unit kind) { return kinds[kind].symbol; }
 const char *bt_units_bare(bt_unit kind) { return kinds[kind].bare; }
 
-// strtod and printf follow the locale of the program that uses the library; the numbers of a case never do.
-static locale_t c_locale(void)
+bool bt_units_entry(int k, bt_unit_entry *out)
 {
-    static locale_t locale; // a race here makes two equal locales and leaks one
-    if (!locale) locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    return locale;
+    if (k < 0 || k >= N_UNITS) return false;
+    *out = units[k];
+    return true;
 }
 
 // Length of a decimal number at the start of s, 0 if there is none: [+-] digits [. digits] [e [+-] digits]. An "e"
@@ -115,7 +108,7 @@ static void list_units(bt_unit kind, char *out, size_t size)
             used += (size_t)snprintf(out + used, size - used, "%s%s", used ? ", " : "", units[i].symbol);
 }
 
-static const unit *find_unit(const char *symbol, size_t n, bt_unit kind)
+static const bt_unit_entry *find_unit(const char *symbol, size_t n, bt_unit kind)
 {
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strlen(words[i].word) == n && !memcmp(words[i].word, symbol, n))
@@ -131,7 +124,7 @@ static bool refuse_unit(const char *number, size_t n_number, const char *symbol,
 {
     char known[160];
     list_units(kind, known, sizeof known);
-    const unit *other = find_unit(symbol, n, BT_UNIT_KINDS);
+    const bt_unit_entry *other = find_unit(symbol, n, BT_UNIT_KINDS);
     int shown = n > 24 ? 24 : (int)n, digits = n_number > 24 ? 24 : (int)n_number;
     const char *cut = n > 24 ? "..." : "";
     if (!*known)
@@ -161,8 +154,10 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
     size_t n_symbol = strlen(symbol);
     while (n_symbol && isspace((unsigned char)symbol[n_symbol - 1])) n_symbol--;
 
-    double number = strtod_l(text, NULL, c_locale());
-    const unit *u = NULL;
+    void *locale = bt_point_begin();
+    double number = strtod(text, NULL);
+    bt_point_end(locale);
+    const bt_unit_entry *u = NULL;
     if (n_symbol) {
         u = find_unit(symbol, n_symbol, kind);
         if (!u) return refuse_unit(text, n, symbol, n_symbol, kind, why);
@@ -187,14 +182,14 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
 int bt_units_format(double value, bt_unit kind, char *out, size_t size)
 {
     if (isnan(value)) return snprintf(out, size, "none");
-    locale_t before = uselocale(c_locale());
+    void *locale = bt_point_begin();
     char digits[40];
     for (int precision = 15; precision <= 17; precision++) {
         snprintf(digits, sizeof digits, "%.*g", precision, value);
         double back = strtod(digits, NULL);
         if (!memcmp(&back, &value, sizeof back)) break;
     }
-    uselocale(before);
+    bt_point_end(locale);
     const char *symbol = kinds[kind].symbol;
     return snprintf(out, size, "%s%s%s", digits, *symbol ? " " : "", symbol);
 }

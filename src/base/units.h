@@ -35,6 +35,15 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
 /// Independent of the locale. Returns the length.
 int bt_units_format(double value, bt_unit kind, char *out, size_t size);
 
+/// A unit that is read: value in SI = number · up / down.
+typedef struct bt_unit_entry {
+    const char *symbol;
+    bt_unit kind;
+    double up, down;
+} bt_unit_entry;
+/// The k-th of them; false when there are fewer.
+bool bt_units_entry(int k, bt_unit_entry *out);
+
 /// Exponent a of the length ratio L under which a quantity of this kind scales as L^a at the same Froude number, with
 /// densities and gravity kept.
 double bt_units_froude(bt_unit kind);

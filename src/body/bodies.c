@@ -2,6 +2,7 @@
 // Storage of the bodies: growth, outlines and parts of a new one.
 #include "body/bodies.h"
 #include "base/elementary.h"
+#include "geometry/apart.h"
 
 #include <assert.h>
 #include <math.h>
@@ -156,6 +157,28 @@ void bt_bodies_turn(bt_bodies *b, bt_idx i)
         b->outline[2 * k] = p->c * v[0] - p->s * v[1];
         b->outline[2 * k + 1] = p->s * v[0] + p->c * v[1];
     }
+}
+
+/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as
+/// bt_part_first.
+static int64_t first_polygon(const bt_mark *mark, int64_t n) { return mark[0].count < n ? mark[0].count : 0; }
+static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at)
+{
+    return at + mark[at].count < n ? at + mark[at].count : -1;
+}
+
+double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n, double dx,
+                       double dy)
+{
+    const bt_mark *own = b->mark + b->offset[i];
+    const double *own_vertex = b->outline + 2 * b->offset[i];
+    const int64_t n_own = b->offset[i + 1] - b->offset[i];
+    double deepest = 0;
+    for (int64_t p = first_polygon(mark, n); p >= 0; p = next_polygon(mark, n, p))
+        for (int64_t q = first_polygon(own, n_own); q >= 0; q = next_polygon(own, n_own, q))
+            deepest = bt_max(deepest, -bt_apart_of(mark[p].count, vertex + 2 * p, own[q].count, own_vertex + 2 * q, dx,
+                                                   dy).gap);
+    return deepest;
 }
 
 double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v)

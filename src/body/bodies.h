@@ -3,6 +3,8 @@
 #ifndef BERGTOW_BODIES_H
 #define BERGTOW_BODIES_H
 
+#include <math.h>
+
 #include "bergtow/world.h"
 
 /// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
@@ -30,6 +32,24 @@ void bt_bodies_turn(bt_bodies *b, bt_idx i);
 /// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
 double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v);
 
+/// Depth to which body i overlaps with polygons, m; <= 0: it does not. They have n vertices, with their marks, and with
+/// their places relative to a centroid from which that of i is (dx, dy), m, as bt_bodies has them: an outline, with its
+/// parts after it.
+double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n, double dx,
+                       double dy);
+
+/// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.
+static inline double bt_into_period(double x, double low, double period, int32_t *laps)
+{
+    if (!(period > 0) || (x >= low && x < low + period)) return x;
+    const double turns = floor((x - low) / period);
+    x -= turns * period;
+    *laps += (int32_t)turns;
+    if (x >= low + period) x -= period, ++*laps; // rounding
+    return x;
+}
+
+/// |d| up to 1.5 periods.
 static inline double bt_nearest_image(double d, double period)
 {
     if (period > 0) {

@@ -574,4 +574,23 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 
+void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    if (!n) return;
+    const double ratio =
+        bt_case_body_mass(c) / (c->water.density * bt_shape_extent(n, v).area * c->body.draft);
+    if (!(ratio >= 1 / BT_ODD_MASS && ratio <= BT_ODD_MASS))
+        bt_errors_add(warnings,
+                      "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "
+                      "unit wrong?",
+                      c->body.mass > 0 ? "body.mass" : "body.density", ratio);
+    if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
+        bt_errors_add(warnings,
+                      "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "
+                      "peaks of collisions are as much too low as that is too long: is a unit wrong?",
+                      c->impact.duration, c->impact.duration / c->run.dt);
+}
+
 bt_status bt_case_finish(bt_case *c, bt_errors *err) { return bt_case_check(c, NULL, err); }

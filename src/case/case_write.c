@@ -153,6 +153,17 @@ void bt_case_list_keys_json(void *stream)
     json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
     json_keys(&j, "file_keys", &bt_base_key, 1);
     json_keys(&j, "study_keys", bt_study_keys, bt_n_study_keys);
+    bt_json_open(&j, "units", '[');
+    bt_unit_entry u;
+    for (int k = 0; bt_units_entry(k, &u); k++) {
+        bt_json_open(&j, NULL, '{');
+        bt_json_string(&j, "symbol", u.symbol);
+        bt_json_string(&j, "si", bt_units_symbol(u.kind));
+        bt_json_number(&j, "up", u.up);
+        bt_json_number(&j, "down", u.down);
+        bt_json_close(&j, '}');
+    }
+    bt_json_close(&j, ']');
     bt_json_close(&j, '}');
     fputs(j.text, stream);
     bt_json_free(&j);

@@ -447,7 +447,7 @@ bt_key bt_case_keys[] = {
     REAL("estimate.length_scale", estimate.length_scale, RATIO, "1", "(0, 1e4]",
          "full scale / this case: p_star is divided by it and p_s by its square, 1 at full scale [Froude]"),
 
-    REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]",
+    REAL("reference.mean_force", reference.mean_force, FORCE, "none", "(0, 1e12]",
          "measured mean ice resistance, shown beside the computed one"),
     TEXT("reference.source", reference.source, "none", "where the measured force was published"),
 

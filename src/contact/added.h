@@ -4,8 +4,8 @@
 //
 // They have no rows in bt_laws: a row's functions know the law by themselves, and one set of functions here serves all
 // that are added. Their bounds are flat and known before the sweeps, so that batches of four take them.
-#ifndef BERGTOW_ADDED_H
-#define BERGTOW_ADDED_H
+#ifndef BERGTOW_CONTACT_ADDED_H
+#define BERGTOW_CONTACT_ADDED_H
 
 #include "bergtow/contact.h"
 #include "contact/law.h"

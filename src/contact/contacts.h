@@ -9,7 +9,8 @@
 // pairs are conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by
 // brute force).
 //
-// Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame.
+// Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame,
+// rounded up to a power of √2; at least the slop, at most 16 mean floe sizes (space/margin.h).
 #ifndef BERGTOW_CONTACTS_H
 #define BERGTOW_CONTACTS_H
 

@@ -109,7 +109,7 @@ bool bt_contacts_outrun(const bt_world *w)
         const bt_cell *cell = &t->cell[k];
         any = cell->own && t->bound[k] > 0 &&
               (!cell->active || bt_margin_for(w, t->bound[k]) > cell->margin ||
-               2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
+               2 * w->par.dt * t->bound[k] > bt_margin_most(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;

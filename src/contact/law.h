@@ -3,7 +3,9 @@
 //
 // Every pair obeys Signorini's conditions and Coulomb's (solve/solver.h). A law bounds the normal impulse of a contact
 // point from above,
-//     0 <= λ <= L(w),   w > 0 only if λ = 0,   w < 0 only if λ is at its bound,
+//     0 <= λ <= L(w),   w > 0 only if λ = 0,   w < 0 only if λ is at its bound
+//
+// (L: an impulse, N s; in bergtow/contact.h a law gives the force L/Δt),
 // and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound
 // holds, and the law that sets it gives way. The bounds of all laws have one shape, so that there is one update of a
 // contact for all of them (solve/limit.h):
@@ -11,8 +13,8 @@
 //
 // Memory. What a law remembers of a pair is one record, bt_memory (space/cells.h), kept in the cell that owns the pair,
 // sorted by (a, b, part, law). It is state: it goes with the pair to other cells and ranks, into checkpoints, and into
-// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step,
-// travels and is saved in the same way as the record of the rigid law.
+// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step, travels and is
+// saved in the same way as the record of the rigid law.
 //
 // In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace what the outlines give
 // (contact/raft.h); the sweeps know bounds only; after them `gives_way` tells which points are at the bound and

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#define ALONG 0.98 // cosine between edges that may lie on each other, as for reference edges (geometry/manifold.c)
+#define ALONG 0.98 // cosine between edges that may lie on each other, as for reference edges (manifold.c)
 
 static int count_of(const bt_bodies *s, bt_idx i, int part)
 {

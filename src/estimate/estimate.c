@@ -181,7 +181,7 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 {
     const bt_estimate_def *d = &estimates[kind];
     bt_estimate e = force_of(d, in);
-    e.compares = e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0;
+    e.compares = e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0 && !in->turns;
     if (e.compares && in->along < BT_EST_STILL * in->ordered) {
         bt_estimate_input faster = *in;
         faster.along *= 2, faster.speed *= 2;

@@ -9,10 +9,10 @@
 
 #include "bergtow/sum.h"
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/largest.h"
 
 // --- a scan over brackets and strings: it never refuses what is JSON, and need not refuse what is none
-// -----------------------
 
 /// A stretch of text that is being gone through; p == NULL: it is not what was looked for.
 typedef struct scan { const char *p, *end; } scan;
@@ -135,7 +135,9 @@ static bool take_number(scan *s, double *x)
     } else {
         memcpy(copy, begin, n);
         copy[n] = '\0';
+        void *locale = bt_point_begin();
         *x = strtod(copy, NULL);
+        bt_point_end(locale);
     }
     *x += whole ? 0.0 : -0.0; // there is no whole −0
     s->p = p;

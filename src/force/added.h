@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Force laws that a program has added, as checkpoints know them.
-#ifndef BERGTOW_ADDED_H
-#define BERGTOW_ADDED_H
+#ifndef BERGTOW_FORCE_ADDED_H
+#define BERGTOW_FORCE_ADDED_H
 
 #include "bergtow/forces.h"
 

@@ -2,9 +2,9 @@
 // The load on a body, and all that is implicit of it at a velocity; equations in bergtow/forces.h.
 #include "force/load.h"
 
-/// form · v max(0, −v·n) dl; (rx, ry): U_ref − U, w: ω. On an
-/// edge v is linear and n constant, so that g = form max(0, −v·n) dl and its moments to r² are polynomials up to the
-/// third degree where water comes in: two points of Gauss are exact.
+/// form · v max(0, −v·n) dl; (rx, ry): U_ref − U, w: ω. On an edge v is linear and n constant, so that
+/// g = form max(0, −v·n) dl and its moments to r² are polynomials up to the third degree where water comes in: two
+/// points of Gauss are exact.
 void bt_linear_add_outline(const bt_bodies *b, bt_idx i, bt_stream stream, double rx, double ry, double w, bt_linear *a)
 {
     const double form = stream.form, ref_x = stream.u, ref_y = stream.v;

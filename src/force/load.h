@@ -131,11 +131,12 @@ static inline bt_linear bt_load_implicit(const bt_bodies *b, bt_idx i, const bt_
 static inline void bt_linear_take(const bt_linear *l, double dt, double m, double inertia, bt_inv inv, bt_vel *u)
 {
     if (l->gx == 0 && l->gy == 0) { // no coupling
-        if (l->g > 0) { // without drag exactly as it was: a floe that drifts with the water is at rest to the last bit
+        // without drag exactly as it was: a floe that drifts with the water is at rest to the last bit
+        if (l->g > 0 || l->jx != 0 || l->jy != 0) {
             u->x = (m * u->x + dt * l->jx) * inv.m;
             u->y = (m * u->y + dt * l->jy) * inv.m;
         }
-        if (l->gw > 0) u->w = (inertia * u->w + dt * l->twist) * inv.i;
+        if (l->gw > 0 || l->twist != 0) u->w = (inertia * u->w + dt * l->twist) * inv.i;
         return;
     }
     const double x = dt * l->gx, y = dt * l->gy, bx = m * u->x + dt * l->jx, by = m * u->y + dt * l->jy;

@@ -39,7 +39,8 @@
 //                     - all: the momentum starts anew in every solve
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way
 //                     D, - the rest
-//   bt_forces         D own
+//   bt_forces         S acted, as names of the added laws
+//                     D own
 //                     - what is recorded of the towed body, its place
 //   bt_undisturbed    S drift, vel
 //                     D the rest

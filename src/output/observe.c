@@ -2,11 +2,11 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the
-//     table of force laws)
-// On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
-// the balance leaves; the check is then the resistance found without the rows of the body: from the
-// momentum that everything else has gained (ice_resistance_budget).
+//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)
+// tow = inertia + ice resistance + what the table of force laws has: drag, Coriolis, tilt, ... On a line J_tow is the
+// line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what the balance leaves; the
+// check is then the resistance found without the rows of the body: from the momentum that everything else has gained
+// (ice_resistance_budget).
 #include "output/observe.h"
 
 #include <math.h>

@@ -33,7 +33,7 @@ typedef struct bt_sample {
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
     /// m/s of the body relative to undisturbed ice (step/undisturbed.h) and to the water: along the tow direction, and
-    /// to its left
+    /// across it, positive from +x towards +y
     double speed_through_ice, leeway_through_ice, speed_through_water, leeway_through_water;
     double body_in_ice_x, body_in_ice_y; ///< m, its place in a frame that goes along with undisturbed ice
     /// N (the larger of two branches), m (the first), m, m (NaN without a line)
@@ -114,8 +114,7 @@ const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
 struct bt_impacts;
 
 /// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are distributed in equal blocks in the
-/// order
-/// of their ids; the other bodies are the last rank's. first: [size + 1].
+/// order of their ids; the other bodies are the last rank's. first: [size + 1].
 void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
 
 /// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes

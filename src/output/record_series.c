@@ -79,9 +79,13 @@ const bt_quantity bt_own_series[] = {
     ROW(body_yaw_rate, BODY, LAST, "rad/s", "yaw rate of the towed body"),
     ROW(speed_through_ice, BODY, MEAN, "m/s",
         "speed of the towed body through undisturbed ice (the mean floe in free drift) along the tow direction"),
-    ROW(leeway_through_ice, BODY, MEAN, "m/s", "the same to the left of the tow direction"),
+    ROW(leeway_through_ice, BODY, MEAN, "m/s",
+        "the same across the tow direction, positive from +x towards +y: to the left in the basin's frame, to the "
+        "right in the geographic one"),
     ROW(speed_through_water, BODY, MEAN, "m/s", "speed of the towed body through the water along the tow direction"),
-    ROW(leeway_through_water, BODY, MEAN, "m/s", "the same to the left of the tow direction"),
+    ROW(leeway_through_water, BODY, MEAN, "m/s",
+        "the same across the tow direction, positive from +x towards +y: to the left in the basin's frame, to the "
+        "right in the geographic one"),
     ROW(body_in_ice_x, BODY, LAST, "m",
         "centroid of the towed body in a frame that drifts with undisturbed ice, x: its way through the ice"),
     ROW(body_in_ice_y, BODY, LAST, "m", "the same, y"),

@@ -12,6 +12,7 @@
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "estimate/packing.h"
+#include "geometry/path.h"
 #include "output/summary_window.h"
 #include "base/elementary.h"
 #include "solve/locked.h"
@@ -157,8 +158,8 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
     if (h->outrun)
         bt_errors_add(
             &s->warnings,
-            "in %lld of %lld steps, mostly unconverged ones, a floe moved farther than the contact detection looks "
-            "ahead: a contact may have been met a step late, as overlap; lower run.dt",
+            "in %lld of %lld steps a body moved farther than the contact detection looks ahead: a contact may have "
+            "been met a step late, as overlap, or missed; lower run.dt",
             (long long)h->outrun, (long long)h->n);
     if (h->restitution_cut)
         bt_errors_add(
@@ -223,6 +224,31 @@ static void without_tow(bt_summary *s, const bt_case *c)
                   c->tow.direction * 180 / BT_PI);
 }
 
+/// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
+/// on the course there. *in says when that turns within the window.
+static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input *in)
+{
+    bt_case straight = *c; // texts and tables remain those of c
+    bt_path path = {0};
+    char why[200];
+    bool turns = false;
+    if (c->tow.mode != BT_TOW_NONE && s->end > s->start) {
+        const double from = bt_case_tow_distance(c, s->start), to = bt_case_tow_distance(c, s->end);
+        if (c->tow.n_programme > 0 || s->start < c->tow.ramp)
+            straight.tow.speed = (to - from) / (s->end - s->start);
+        if (c->tow.n_waypoints > 0 && bt_case_tow_path(c, &path, why)) {
+            double a[2], b[2], first[2], last[2];
+            bt_path_at(&path, from, a, first);
+            bt_path_at(&path, to, b, last);
+            straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);
+            turns = fabs(first[0] * last[1] - first[1] * last[0]) > BT_TURN;
+            bt_path_free(&path);
+        }
+    }
+    bt_estimate_conditions(&straight, in);
+    in->turns = turns;
+}
+
 /// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift.
 static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_totals *t)
 {
@@ -262,7 +288,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         without_tow(s, c);
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
-        bt_estimate_conditions(c, &s->estimate);
+        order_window(c, &s->window, &s->estimate);
         measure_speeds(s, h, t);
         s->estimate.concentration = t->concentration;
         if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
@@ -280,6 +306,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 
     bt_case_warn_idle(c, &s->warnings);
     bt_case_warn_tables(c, &s->warnings);
+    bt_case_warn_body(c, &s->warnings);
     bt_ice_warn_closed(c, t->ice_area, &s->warnings);
     if (t->undisturbed) bt_case_warn_lead(c, t->undisturbed->drift_x, t->undisturbed->drift_y, &s->warnings);
     warn_of_solver(s, h, c, t);

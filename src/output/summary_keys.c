@@ -90,8 +90,7 @@ static const char *state_hash(const view *v)
     return text;
 }
 
-// --- arrays and objects whose members are counted
-// ---------------------------------------------------------------------
+// --- arrays and objects whose members are counted -------------------------------------------------------------------
 
 static void write_quarters(bt_json *j, const char *key, const view *v, const void *reported)
 {

@@ -286,10 +286,13 @@ void bt_setup_track_free(bt_track *t)
 
 static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
 
-/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners.
+/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners. Each pair of
+/// bodies touches as one image: around a period a wall goes on for as far as any body reaches beyond the seam.
 static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
 {
-    const double thick = bt_max(0.1 * bt_max(c->domain.length, c->domain.width), 5 * w->par.size);
+    double thick = bt_max(0.1 * bt_max(c->domain.length, c->domain.width), 5 * w->par.size);
+    for (bt_idx i = 0; i < w->bodies.n && (w->par.period_x > 0 || w->par.period_y > 0); i++)
+        thick = bt_max(thick, 1.1 * w->bodies.radius[i]);
     const double x0 = c->domain.x0, x1 = x0 + c->domain.length, y0 = c->domain.y0, y1 = y0 + c->domain.width;
     const double mid_x = 0.5 * (x0 + x1), mid_y = 0.5 * (y0 + y1), h = 0.5 * thick;
     int n = 0;
@@ -310,15 +313,11 @@ static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
     return n;
 }
 
-/// Are a, displaced by from, and b apart, also while a moves on by (dx, dy) relative to b? Separating axes of the
-/// convex hull of both ends of the
-/// path: edge normals of a and of b, and the normal of the path.
-static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
+/// Are a and b, which lies d from a, apart, also while a moves on by (dx, dy) relative to b? Separating axes of the
+/// convex hull of both ends of the path: edge normals of a and of b, and the normal of the path.
+static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double d[2], double dx, double dy)
 {
     const bt_bodies *bd = &w->bodies;
-    double d[2];
-    bt_bodies_offset(w, a, b, d);
-    d[0] -= from[0], d[1] -= from[1];
     const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
     for (int64_t k = 0; k <= na + nb; k++) {
         double nx = -dy, ny = dx;
@@ -345,6 +344,30 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double fr
     return false;
 }
 
+/// The same for a displaced by from, and all images of b around the periods.
+static bool images_apart(const bt_world *w, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
+{
+    const double period[2] = {w->par.period_x, w->par.period_y}, way[2] = {dx, dy};
+    double d[2], near[2];
+    int64_t low[2] = {0, 0}, high[2] = {0, 0};
+    bt_bodies_offset(w, a, b, d);
+    for (int k = 0; k < 2; k++) {
+        d[k] -= from[k];
+        if (!(period[k] > 0)) continue;
+        const double reach = w->bodies.radius[a] + w->bodies.radius[b]; // at either end of the way
+        low[k] = (int64_t)ceil((bt_min(way[k], 0) - reach - d[k]) / period[k]);
+        high[k] = (int64_t)floor((bt_max(way[k], 0) + reach - d[k]) / period[k]);
+    }
+    bool apart = true;
+    for (int64_t i = low[0]; i <= high[0]; i++)
+        for (int64_t j = low[1]; j <= high[1] && apart; j++) {
+            near[0] = d[0] + (double)i * period[0];
+            near[1] = d[1] + (double)j * period[1];
+            apart = apart_on_path(w, a, b, near, dx, dy);
+        }
+    return apart;
+}
+
 /// Displacement of body m, of prescribed velocity, from the start until time t.
 static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
 {
@@ -365,7 +388,7 @@ static bool meet(const bt_case *c, const bt_world *w, bt_idx i, bt_idx j, bool w
         displacement(c, w, j, end * k / pieces, dj);
         const double to[2] = {dj[0] - di[0], dj[1] - di[1]};
         if (wall && (w->bodies.motion[j] == BT_STATIC || (to[0] == 0 && to[1] == 0))) return false;
-        if (!apart_on_path(w, j, i, from, to[0] - from[0], to[1] - from[1])) return true;
+        if (!images_apart(w, j, i, from, to[0] - from[0], to[1] - from[1])) return true;
         from[0] = to[0], from[1] = to[1];
     }
     return false;

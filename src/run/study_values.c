@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "base/rng.h"
 #include "base/suggest.h"
@@ -154,17 +155,28 @@ static double between(double from, double to, bool logarithmic, double at)
     return logarithmic ? from * bt_pow(to / from, at) : from + at * (to - from);
 }
 
-/// Value at a place of a range, 0 ... 1 between its ends, in SI with all its digits.
+/// x as a case takes it, in SI with all its digits: a bare number, but for angles, which would be degrees without their
+/// unit (base/units.h).
+static char *value_text(const bt_study_parameter *p, double x)
+{
+    const bt_unit kind = bt_case_keys[p->key].unit;
+    const bool bare = kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;
+    const char *unit = bare ? NULL : bt_units_symbol(kind);
+    int digits = 6; // 0.3, not 0.30000000000000004, where nothing is lost
+    void *locale = bt_point_begin();
+    for (char number[40]; digits < 17; digits++) {
+        snprintf(number, sizeof number, "%.*g", digits, x);
+        if (fabs(strtod(number, NULL) - x) <= 1e-12 * fabs(x)) break;
+    }
+    bt_point_end(locale);
+    return bt_text_of("%.*g%s%s", digits, x, unit ? " " : "", unit ? unit : "");
+}
+
+/// Value at a place of a range, 0 ... 1 between its ends.
 static char *range_value(const bt_study_parameter *p, double at)
 {
     const double x = between(p->from, p->to, p->logarithmic, at);
-    if (bt_study_is_whole(p)) return bt_text_of("%.0f", nearbyint(x));
-    for (int digits = 6; digits < 17; digits++) { // 0.3, not 0.30000000000000004, where nothing is lost
-        char *text = bt_text_of("%.*g", digits, x);
-        if (fabs(strtod(text, NULL) - x) <= 1e-12 * fabs(x)) return text;
-        free(text);
-    }
-    return bt_text_of("%.17g", x);
+    return bt_study_is_whole(p) ? bt_text_of("%.0f", nearbyint(x)) : value_text(p, x);
 }
 
 /// Value below which the share u of what is drawn from a range lies. Each whole number stands for the half below and

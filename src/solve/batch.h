@@ -3,8 +3,7 @@
 //
 //     contacts   [0] [1] [2] [3] [4] [5] ...      a contact a row; half of them bear no load and are not listed
 //     list     0       2   3       5  ...
-//     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four contacts, ny of four
-//     contacts, ...
+//     batch   {0 2 5 9} {3 7 8 11} ...         an array of vectors each: nx of four contacts, ny of four, ...
 //
 // A sweep goes through the batches of a cell in sequence, and updates the four contacts of each at once: as they share
 // no body that can be moved, that is the same as one after the other. So the order of a cell's updates is that of its

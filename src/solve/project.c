@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Split-impulse position projection: overlap is removed by displacements that never become velocities.
 //
-// With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M⁻¹ J_nᵀ p with
+// With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M̃⁻¹ J_nᵀ p, M̃ as in
+// solver.h, with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
 // by the same rows without friction, in rounds over the points that bear or overlap (rounds.h). Touching contacts (g2 ≥
 // −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
@@ -139,7 +140,7 @@ void bt_solver_project(bt_world *w)
                     .length = 25,
                     .limit = (double)w->par.position_sweeps,
                     .plain = w->par.plain_sweeps};
-    bt_rounds_scale(&p, ts->heaviest);
+    bt_rounds_scale(&p, ts);
     bt_work work = {0};
     bt_rounds_residual(w, &p, false, &work);
     if (p.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates

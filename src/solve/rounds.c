@@ -23,13 +23,16 @@
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
 
-// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What
-// a cell adds ends at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the
-// quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one contact at convergence, so that 10²⁷ times that still fits.
-void bt_rounds_scale(bt_problem *p, double heaviest)
+// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on.
+// What a cell adds ends at 2⁴⁵, some 6,000 times the tolerance, and earlier in a field of so many cells that a sum
+// would not hold them: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the
+// energy of one contact at convergence, so that 10²⁷ times that still fits.
+void bt_rounds_scale(bt_problem *p, const bt_cells *t)
 {
+    const double heaviest = t->heaviest, cells = (double)t->n_x * t->n_y + 1;
     const double energy = heaviest * p->tolerance * p->tolerance;
     p->per_square = p->tolerance > 0 ? ldexp(1, 20 - bt_ceil_2log2(p->tolerance)) : 0x1p60;
+    p->most_squares = bt_min(0x1p45, 0x1p62 / cells);
     const bool scaled = energy > 0 && isfinite(energy);
     p->per_energy = scaled ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
 }
@@ -51,7 +54,7 @@ void bt_rounds_list(bt_cell *cell)
 void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t)
 {
     cell->work.bad = bad > 0;
-    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(squares * p->per_square, 0x1p45));
+    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(squares * p->per_square, p->most_squares));
     bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)rows);
     bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
     bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
@@ -74,8 +77,8 @@ static void mark_block(bt_cells *t, int32_t x, int32_t y, double listed)
     }
 }
 
-/// Tell the value of each cell that has work, 1 or 0, to `take`, which spreads it to the cells around; on all ranks.
-/// Collective.
+/// Collective. Tell the value of each cell that has work, 1 or 0, to `take` on all ranks, which spreads it to the cells
+/// around.
 static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
 {
     bt_cells *t = w->cells;
@@ -138,8 +141,7 @@ void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *
     lists_are_new(w);
 }
 
-// --- rounds over a part of the field
-// -------------------------------------------------------------------------------------
+// --- rounds over a part of the field --------------------------------------------------------------------------------
 
 /// The cell at (x, y) is bad: its list and those beside it stay.
 static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)

@@ -81,6 +81,7 @@ typedef struct bt_problem {
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
     double tolerance;     ///< of the residual
     double per_square;    ///< factor on sums of squares, see bt_sum
+    double most_squares;  ///< of one cell, times that
     double per_energy;    ///< and on products of moves
     double cap;           ///< of the momentum at the start
     int length;           ///< sweeps of a round at the start
@@ -107,8 +108,8 @@ typedef struct bt_work {
     int64_t rows, contacts, listed, bad;
 } bt_work;
 
-/// Scales of the exact sums for a tolerance of the residual, and the largest mass, kg.
-void bt_rounds_scale(bt_problem *p, double heaviest);
+/// Scales of the exact sums for a tolerance of the residual, the largest mass and the number of cells.
+void bt_rounds_scale(bt_problem *p, const bt_cells *t);
 
 /// Room for the list of a cell: what a residual pass calls before it lists.
 void bt_rounds_list(bt_cell *cell);

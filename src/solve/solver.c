@@ -286,7 +286,7 @@ static bt_problem contact_problem(const bt_world *w)
         .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES),
         .plain = w->par.plain_sweeps,
     };
-    bt_rounds_scale(&p, w->cells->heaviest);
+    bt_rounds_scale(&p, w->cells);
     return p;
 }
 

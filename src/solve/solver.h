@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Signorini–Coulomb contact problem of one step, by projected Gauss–Seidel.
 //
-//     w = J U2 + b,   M (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
+//     w = J U2 + b,   M̃ (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
+//
+// with M̃ = M + Δt diag K, the mass with what of the drag is implicit (bodies.inv is its inverse).
 //
 // A sweep updates contacts one after the other (a contact is a manifold: the normals of its two points are solved
 // together, and their friction as one), cell by cell in the order of cells.h, with the velocities as they stand.

@@ -161,7 +161,8 @@ typedef struct bt_share {
 
 enum { BT_FEW_CELLS = 64 }; ///< fewer are done by one thread: a team costs microseconds
 
-enum { BT_AWAKE, BT_ASLEEP_NEW, BT_ASLEEP }; ///< at rest since the last step; and the forces have been informed
+/// NEW: at rest since the last step, and U* is still to be formed once more. Then the prediction passes over the cell.
+enum { BT_AWAKE, BT_ASLEEP_NEW, BT_ASLEEP };
 
 typedef struct bt_cells {
     bool labelled;                  ///< labels and storage order are valid
@@ -191,7 +192,9 @@ typedef struct bt_cells {
     /// [n] all bodies drift with the water and nothing moved them in the last step: BT_AWAKE, BT_ASLEEP_NEW or
     /// BT_ASLEEP
     uint8_t *asleep;
-    uint8_t *awake;                 ///< [n] contacts of this step may move the cell's bodies
+    /// [n] contacts of this step may move the cell's bodies. Not the opposite of asleep: a contact may reach a cell
+    /// that is at rest
+    uint8_t *awake;
     bt_idx *busy;                   ///< [n_busy] cells that a step looks at, ascending; the last cell is always one
     bt_idx n_busy;
     uint8_t *is_busy;               ///< [n]

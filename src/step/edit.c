@@ -6,9 +6,9 @@
 #include "step/edit.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "body/bodies.h"
-#include "contact/contacts.h"
 #include "partition/domain.h"
 #include "space/cells.h"
 #include "step/window.h"
@@ -54,45 +54,57 @@ bt_status bt_edit_velocity(bt_world *w, bt_gid gid, const double v[3], bt_errors
     return BT_OK;
 }
 
-static void put(bt_bodies *b, bt_idx i, double x, double y, double yaw)
+/// Put body i, if this rank holds it, to a place. The periods that this lies from the domain are taken off, and counted
+/// as those are by which it has gone; a floe of a moving window has been put into the window.
+static void put(bt_world *w, bt_idx i, const double to[3])
 {
-    b->pose[i].x = x, b->pose[i].y = y, b->pose[i].yaw = yaw;
+    bt_bodies *b = &w->bodies;
+    if (i < 0) return;
+    bt_pose *p = &b->pose[i];
+    if (w->tow && i == bt_world_towed(w)) {
+        w->tow->travel_x += to[0] - p->x;
+        w->tow->travel_y += to[1] - p->y;
+    }
+    int32_t across = 0;
+    p->x = bt_into_period(to[0], w->par.x0, w->par.period_x, &b->home[i].lap);
+    p->y = bt_into_period(to[1], w->par.y0, w->par.period_y, &across);
+    p->yaw = to[2];
     bt_bodies_turn(b, i);
+    if (w->window && b->gid[i] < w->window->n_floes) b->home[i].lap = bt_window_lap(w, p->x);
 }
 
-/// What counts the periods that a body has gone by: it has been put into the window, and elsewhere by as much as it was
-/// moved.
-static void unwrap(bt_world *w, bt_idx i, const bt_pose *was)
-{
-    const bt_pose *p = &w->bodies.pose[i];
-    if (w->window && w->bodies.gid[i] < w->window->n_floes)
-        w->bodies.home[i].lap = bt_window_lap(w, p->x);
-    if (!w->tow || i != bt_world_towed(w)) return;
-    w->tow->travel_x += p->x - was->x;
-    w->tow->travel_y += p->y - was->y;
-}
-
-/// Id of a body that body i overlaps by more than is left alone, −1 = none: of those that this rank holds.
-static double obstacle_of(const bt_world *w, bt_idx i)
+/// Collective. Id of a body over which body gid would lie at a place, by more than is left alone; −1 = none. The rank
+/// that owns it shows its outline there to all, as none of them need hold both it and what stands there.
+static double obstacle_at(const bt_world *w, bt_gid gid, const double to[3])
 {
     const bt_bodies *b = &w->bodies;
-    for (bt_idx j = 0; j < b->n; j++) {
-        double d[2];
-        bt_bodies_offset(w, i, j, d);
-        if (j == i || bt_hypot(d[0], d[1]) > b->radius[i] + b->radius[j]) continue;
-        const bool first = b->gid[i] < b->gid[j];
-        const bt_idx one = first ? i : j, other = first ? j : i;
-        for (int p = bt_part_first(b, one); p >= 0; p = bt_part_next(b, one, p))
-            for (int q = bt_part_first(b, other); q >= 0; q = bt_part_next(b, other, q)) {
-                bt_manifold m;
-                double gap = INFINITY;
-                int32_t axis = -1;
-                const uint16_t part[2] = {(uint16_t)p, (uint16_t)q};
-                bt_contacts_parts(w, one, other, part, 0, -1, &m, &gap, &axis);
-                if (gap < -w->par.slop) return (double)b->gid[j];
-            }
+    const bt_idx i = bt_world_index(w, gid);
+    const size_t own = i >= 0 && bt_domain_owns(w, i) ? (size_t)(b->offset[i + 1] - b->offset[i]) : 0;
+    double *turned = bt_alloc(2 * own, sizeof *turned), s, c, radius = 0;
+    bt_sincos(to[2], &s, &c);
+    for (size_t k = 0; k < own; k++) {
+        const double *v = b->vertices + 2 * ((size_t)b->offset[i] + k);
+        turned[2 * k] = c * v[0] - s * v[1];
+        turned[2 * k + 1] = s * v[0] + c * v[1];
     }
-    return -1;
+    size_t n;
+    double *vertex = bt_domain_gather_all(w, turned, own, 2 * sizeof *turned, &n);
+    bt_mark *mark = bt_domain_gather_all(w, own ? b->mark + b->offset[i] : NULL, own, sizeof *mark, &n);
+    for (size_t k = 0; k < n; k++) radius = bt_max(radius, bt_hypot(vertex[2 * k], vertex[2 * k + 1]));
+    double found = -1;
+    for (bt_idx j = 0; j < b->n; j++) {
+        double d[2] = {b->pose[j].x - to[0], b->pose[j].y - to[1]};
+        if (w->par.period_x > 0) d[0] -= w->par.period_x * nearbyint(d[0] / w->par.period_x);
+        if (w->par.period_y > 0) d[1] -= w->par.period_y * nearbyint(d[1] / w->par.period_y);
+        if (b->gid[j] == gid || bt_hypot(d[0], d[1]) > radius + b->radius[j]) continue;
+        if (bt_bodies_depth(b, j, mark, vertex, (int64_t)n, d[0], d[1]) > w->par.slop)
+            found = bt_max(found, (double)b->gid[j]);
+    }
+    free(turned);
+    free(vertex);
+    free(mark);
+    bt_domain_maxima(w, &found, 1);
+    return found;
 }
 
 bt_status bt_edit_place(bt_world *w, bt_gid gid, const double to[3], bt_errors *err)
@@ -104,21 +116,13 @@ bt_status bt_edit_place(bt_world *w, bt_gid gid, const double to[3], bt_errors *
                       id);
         return BT_ERR_USAGE;
     }
-    const bt_idx i = bt_world_index(w, gid);
-    bt_pose was = {0};
-    double obstacle = -1;
-    if (i >= 0) {
-        was = w->bodies.pose[i];
-        put(&w->bodies, i, to[0], to[1], to[2]);
-        obstacle = obstacle_of(w, i);
-    }
-    bt_domain_maxima(w, &obstacle, 1); // not every rank that has the body has what it would lie over
-    if (i >= 0 && obstacle >= 0) put(&w->bodies, i, was.x, was.y, was.yaw);
-    else if (i >= 0) unwrap(w, i, &was);
+    const double obstacle = obstacle_at(w, gid, to);
     if (obstacle >= 0) {
         bt_errors_add(err, "body %lld: would lie over body %lld there; choose a free place", id, (long long)obstacle);
         return BT_ERR_USAGE;
     }
+    const bt_idx i = bt_world_index(w, gid);
+    put(w, i, to);
     stir(w, i);
     return BT_OK;
 }

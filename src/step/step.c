@@ -19,16 +19,6 @@
 #include "partition/domain.h"
 #include "space/phases.h"
 
-/// Into the period; *lap counts the periods that were taken off.
-static double wrap(double x, double low, double period, int32_t *lap)
-{
-    if (period > 0) {
-        if (x < low) return --*lap, x + period;
-        if (x >= low + period) return ++*lap, x - period;
-    }
-    return x;
-}
-
 /// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there
 /// only for cells that contacts may move: for others their array still holds what it held, maybe of other bodies.
 static double move(bt_world *w, bt_idx i, bool shifted)
@@ -48,8 +38,8 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     bt_pose *p = &b->pose[i];
     if (dx != 0 || dy != 0) {
         int32_t across = 0;
-        p->x = wrap(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);
-        p->y = wrap(p->y + dy, w->par.y0, w->par.period_y, &across);
+        p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);
+        p->y = bt_into_period(p->y + dy, w->par.y0, w->par.period_y, &across);
     }
     if (turn != 0) {
         p->yaw += turn;
@@ -66,7 +56,7 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     return path;
 }
 
-/// All bodies of cell k drift with the water, and nothing pushed them apart.
+/// All bodies of cell t drift with the water, and nothing pushed them apart.
 static bool at_rest(const bt_world *w, const bt_cell *t)
 {
     const bt_bodies *b = &w->bodies;
@@ -215,7 +205,7 @@ static void solve_contacts(bt_world *w)
     for (bool done = false; !done;) {
         bt_contacts_detect(w, again); // gaps and J at X1
         clock_phase(w, &st->phases.detect, &t0);
-        bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
         clock_phase(w, &st->phases.solve, &t0);
         sweeps += st->sweeps;
         updates += st->unit_updates;

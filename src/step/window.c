@@ -16,7 +16,6 @@
 #include "space/cells.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
-#include "geometry/apart.h"
 #include "base/elementary.h"
 
 #define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
@@ -90,27 +89,16 @@ static bool due(const bt_world *w, bt_idx i)
     return late > 0 && floe_at(w, i) < v->rear + bt_min(late, ZONE_SHARE * (v->length - v->ahead));
 }
 
-/// x brought into the period from `low`; *turns: periods it lay above.
-static double into(double x, double low, double period, int32_t *turns)
-{
-    *turns = 0;
-    if (!(period > 0)) return x;
-    *turns = (int32_t)floor((x - low) / period);
-    x -= *turns * period;
-    if (x >= low + period) x -= period, ++*turns; // rounding
-    return x;
-}
-
 /// Place that floe i takes in the mother field around the period; *turns: periods that it lies from there without
 /// copies.
 static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
 {
     const bt_window *v = w->window;
     const bt_home *h = &w->bodies.home[i];
-    int32_t across;
+    int32_t across = 0;
     bt_pose p = {.yaw = h->yaw, .c = bt_cos(h->yaw), .s = bt_sin(h->yaw)};
-    p.x = into(h->x + w->undisturbed->drift_x, w->par.x0, v->length, turns);
-    p.y = into(h->y + w->undisturbed->drift_y, w->par.y0, w->par.period_y, &across);
+    p.x = bt_into_period(h->x + w->undisturbed->drift_x, w->par.x0, v->length, turns);
+    p.y = bt_into_period(h->y + w->undisturbed->drift_y, w->par.y0, w->par.period_y, &across);
     return p;
 }
 
@@ -141,7 +129,7 @@ static candidate *collect(const bt_world *w, size_t *n, shapes *shape)
         m = n_vertices = 0;
         for (bt_idx i = 0; i < b->n; i++) {
             if (!renewable(w, i) || !bt_domain_owns(w, i) || !due(w, i)) continue;
-            int32_t turns;
+            int32_t turns = 0;
             const bt_pose p = place_of(w, i, &turns);
             const int64_t count = b->offset[i + 1] - b->offset[i];
             if (pass)
@@ -178,29 +166,6 @@ static candidate *find(candidate *list, size_t n, bt_gid gid)
     return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
 }
 
-/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as
-/// bt_part_first.
-static int64_t first_polygon(const bt_mark *mark, int64_t n) { return mark[0].count < n ? mark[0].count : 0; }
-static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at)
-{
-    return at + mark[at].count < n ? at + mark[at].count : -1;
-}
-
-/// Depth to which candidate c at its place and body i, (dx, dy) from there, overlap, m; <= 0: they do not.
-static double depth(const bt_bodies *b, bt_idx i, const candidate *c, const shapes *s, double dx, double dy)
-{
-    const bt_mark *own = s->mark + c->first, *other = b->mark + b->offset[i];
-    const double *own_vertex = s->vertex + 2 * c->first, *other_vertex = b->outline + 2 * b->offset[i];
-    const int64_t n = b->offset[i + 1] - b->offset[i];
-    double deepest = 0;
-    for (int64_t p = first_polygon(own, c->n); p >= 0; p = next_polygon(own, c->n, p))
-        for (int64_t q = first_polygon(other, n); q >= 0; q = next_polygon(other, n, q))
-            deepest = bt_max(
-                deepest,
-                -bt_apart_of(own[p].count, own_vertex + 2 * p, other[q].count, other_vertex + 2 * q, dx, dy).gap);
-    return deepest;
-}
-
 /// Mark the places that body i, where it is, does not leave free.
 static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t n, const shapes *s, double *blocked)
 {
@@ -213,7 +178,7 @@ static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t 
                      dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
         const double reach = b->radius[i] + c->radius;
         if (dx * dx + dy * dy >= reach * reach) continue;
-        if (depth(b, i, c, s, dx, dy) > slop) blocked[k] = 1;
+        if (bt_bodies_depth(b, i, s->mark + c->first, s->vertex + 2 * c->first, c->n, dx, dy) > slop) blocked[k] = 1;
     }
 }
 
@@ -283,7 +248,7 @@ static void put(bt_world *w, bt_idx i)
     bt_bodies *b = &w->bodies;
     const bt_window *v = w->window;
     bt_home *h = &b->home[i];
-    int32_t turns;
+    int32_t turns = 0;
     b->pose[i] = place_of(w, i, &turns);
     h->copy += (int32_t)v->sign;
     h->lap = turns + h->copy;

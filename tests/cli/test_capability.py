@@ -122,7 +122,7 @@ def test_what_contradicts_the_bracket_is_reported():
 
 def test_what_contradicts_the_bracket_is_run_until_it_is_decided(monkeypatch):
     c = capability.Condition("case", "the case", np.nan, {}, tried({0.2: (6, 6), 0.95: (6, 6)}))
-    search = capability.Search(type("Runs", (), {"jobs": 2}), "ice.concentration", 0.1, None)
+    search = capability.Search(type("Runs", (), {"jobs": 2}), "ice.concentration", "", 0.1, None)
     def add(c, value, n):
         c.search.point(value).bad += n
         return True
@@ -358,7 +358,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
     case = write_case(tmp_path, THRUST)
     runs = case_runs.CaseRuns(case, tmp_path, "capability", Path(BERGTOW), [], 1, np.inf, np.inf)
     monkeypatch.setattr(capability, "Run", made_up_run)
-    search = capability.Search(runs, "ice.concentration", 0.1, None)
+    search = capability.Search(runs, "ice.concentration", "", 0.1, None)
     def found_with(failing):
         monkeypatch.setattr(runs, "make", lambda name, fields, sets: [failing(i) for i in fields])
         c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=12))

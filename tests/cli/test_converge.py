@@ -66,6 +66,22 @@ def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
     assert converge_text.cells(row)[-1] == "a run has no mean ice resistance"
 
 
+def test_a_window_without_resistance_has_nothing_to_compare(monkeypatch):
+    """Red when it is 0 / 0: field after field is made until the budget is spent."""
+    class Empty:
+        window, adrift, steps_per_sample = (10.0, 40.0), np.inf, 1
+        def __init__(self, path): pass
+        def __enter__(self): return self
+        def __exit__(self, *error): pass
+        def __getitem__(self, name): return np.arange(100.0) if name == "time" else np.zeros(100)
+        def value(self, key): return 1.0
+    monkeypatch.setattr(converge, "Run", Empty)
+    asked = []
+    study = SimpleNamespace(there=lambda name, n, values: asked.append(n) or True, path=lambda name, i: None)
+    row, = converge.window(study, 0.1)
+    assert row["judged"] == "open" and row["why"].startswith("nothing to hold") and asked == [4]
+
+
 CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20, ice__concentration=0.5)
 
 

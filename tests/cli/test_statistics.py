@@ -95,6 +95,27 @@ def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
     assert "NOT STEADY over all fields" in result.stdout and "rises by 40.0 N" in result.stdout
 
 
+def test_each_field_counts_by_its_time():
+    """Seven fields with slow correlation and one that met no ice. Red when each is thinned by its own: what is left is
+    then nearly all of the field without ice."""
+    rng, n = np.random.default_rng(1), 4000
+    fields = [np.zeros(n)]
+    for _ in range(7):
+        x = np.convolve(rng.normal(size=n + 79), np.ones(80) / 80, "valid")
+        fields.append(1000 + 3000 * x)
+    members = [{"tau_samples": stat_mean.series_mean(x).tau} for x in fields]
+    pooled, independent, above = ensemble.samples(SimpleNamespace(steady=lambda m: fields[m]), range(8), members)
+    assert len(pooled) == 8 * n and np.mean(pooled <= 0) == pytest.approx(1 / 8, abs=0.01)
+    assert np.percentile(pooled, 50) > 800
+    assert 8 * n / 400 < independent < 8 * n / 20 and 0.7 < len(above) / independent < 0.95
+
+
+@pytest.mark.parametrize("word", ["--gap=-5", "--gap=nan", "--threshold=nan"])
+def test_what_no_peaks_are_counted_by_is_refused(plain, word):
+    result = script("ensemble.py", plain[0], word)
+    assert result.returncode == 2 and word.partition("=")[0] in result.stderr and not result.stdout
+
+
 def test_means_and_intervals_of_known_fields(plain):
     _, _, s = plain
     for c in s["conditions"][2:]:

@@ -18,13 +18,13 @@
 #include "bergtow/run.h"
 #include "run/setup.h"
 #include "force/drift.h"
+#include "force/load.h"
 #include "output/observe.h"
 #include "step/window.h"
 
 #include "examples/force_law.c"
 
-// --- a spring that holds the towed body at x = 0, y = 0
-// ---------------------------------------------------------------
+// --- a spring that holds the towed body at x = 0, y = 0 --------------------------------------------------------------
 
 static void spring(const bt_force_body *b, bt_load *l)
 {
@@ -502,9 +502,21 @@ static int clean_up(void **state)
     return system(command);
 }
 
+/// j − K (U, ω) with K = 0 is a force like any other. Red when it counts only where something is damped.
+static void what_is_linear_acts_without_damping(void **state)
+{
+    (void)state;
+    const double dt = 0.5, m = 4, inertia = 8;
+    bt_linear l = {.jx = 3, .jy = -2, .jw = 5, .twist = 5};
+    bt_vel u = {.x = 1, .y = 2, .w = 0.25};
+    bt_linear_take(&l, dt, m, inertia, (bt_inv){1 / m, 1 / inertia}, &u);
+    assert_true(u.x == 1 + dt * 3 / m && u.y == 2 - dt * 2 / m && u.w == 0.25 + dt * 5 / inertia);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_linear_acts_without_damping),
         cmocka_unit_test(what_will_not_do_is_refused),
         cmocka_unit_test(its_keys_are_keys_of_the_case),
         cmocka_unit_test(the_tow_bears_it_at_a_set_speed),

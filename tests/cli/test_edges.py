@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: MIT
+"""Where a run could go wrong without a word: bodies faster than the search for contacts, seams of periods, windows on
+another leg than the first, ranges of angles."""
+import json
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, DONE, ROOT, TOW, call, changed, environment, launcher, run, script, warned, write_case
+
+FREE = {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}
+PAIR = {
+    "run": {"dt": 10, "duration": 60},
+    "domain": {"frame": "basin", "length": 400, "width": 100, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "start": "rest", "drag": FREE},
+    "body": {"shape": "none"}, "tow": {"mode": "none"},
+}
+
+
+@pytest.mark.parametrize("apart,speed", [(22, 1.3), (19.5, 1.0), (25, 1.45)])
+def test_bodies_that_may_have_passed_through_each_other_are_reported(tmp_path, apart, speed):
+    """Two floes of 1 m that come nearer by more than 16 sizes in a step, up to which contacts are looked for. Red with
+    any slack beyond that: they change places without a contact, an overlap or a word."""
+    r = run(tmp_path, changed(PAIR, floes=[
+        {"shape": "square", "length": 1, "x": 100, "y": 0, "thickness": 1, "vx": speed, "vy": 0},
+        {"shape": "square", "length": 1, "x": 100 + apart, "y": 0, "thickness": 1, "vx": -speed, "vy": 0}]))
+    assert warned(r, "farther than the contact detection looks ahead.*or missed")
+
+
+def test_a_wall_goes_on_around_the_period_as_far_as_a_long_body_reaches(tmp_path):
+    """The bow of a body at the seam comes to the wall as it does elsewhere. Red with walls that end a tenth of the
+    domain beyond the seam: it goes 20 m into the wall before anything is seen."""
+    found = []
+    for name, x in (("seam", 1), ("middle", 200)):
+        case = changed(PAIR, run={"dt": 0.5, "duration": 45}, domain={"length": 400, "width": 200, "ends": "periodic",
+                                                                     "sides": "wall"},
+                       body={"shape": "rectangle", "length": 180, "width": 10, "draft": 5, "sail": 0.5,
+                             "x": x, "y": -30, "yaw": 45, "vx": 0, "vy": -1},
+                       floes=[{"shape": "square", "length": 5, "x": 200 - x + 1, "y": 60, "thickness": 1}])
+        r = run(tmp_path, case, name=name)
+        found.append(r.series("body_y", "body_yaw"))
+        assert r.summary["max_overlap_m"] < 0.05
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_a_pier_is_met_on_any_lap(tmp_path, turn):
+    """Red when only the nearest image is held against the path: the body goes through the pier once a lap."""
+    tow = {"mode": "speed", "speed": 1, "ramp": 1} | ({"waypoints": [[140, 0], [140, 400]], "turn_radius": 0}
+                                                      if turn else {})
+    case = changed(PAIR, run={"dt": 0.5, "duration": 390},
+                   domain={"length": 200, "width": 200, "ends": "periodic", "sides": "periodic"},
+                   body={"shape": "disc", "length": 10, "draft": 5, "sail": 0.5, "x": 100, "y": 0}, tow=tow,
+                   floes=[{"shape": "square", "length": 5, "x": 140 if turn else 50, "y": -60 if turn else 0,
+                           "thickness": 1, "fixed": True}])
+    assert "on its prescribed path" in run(tmp_path, case, code=CASE).result.stderr
+    run(tmp_path, changed(case, run__duration=130), "--quiet", name="short")
+
+
+def test_floes_stay_in_the_domain_however_far_they_go_in_a_step(tmp_path):
+    """Red when one period at most is taken off: floes that drift by 1.5 of them leave the domain."""
+    case = changed(PAIR, run={"dt": 600, "duration": 36000}, domain={"length": 200, "ends": "periodic"},
+                   water={"current_x": 0.5}, ice={"concentration": 0},
+                   floes=[{"shape": "square", "length": 5, "x": x, "y": 0, "thickness": 1} for x in (50, 100, 150)])
+    with h5py.File(run(tmp_path, case).dir / "result.h5") as f:
+        x = f["frames/pose"][:, :, 0]
+    assert len(x) > 10 and (x >= 0).all() and (x < 200).all()
+    np.testing.assert_allclose(np.diff(np.sort((x - x[:, :1]) % 200)), 50, atol=1e-6)
+
+
+@pytest.mark.ranks
+def test_a_place_is_taken_on_all_ranks_or_on_none(tmp_path):
+    """Red when only ranks that hold the body look for what stands there: on two ranks it is put into another one."""
+    path = write_case(tmp_path, changed(PAIR, run={"dt": 1, "duration": 60}, domain={"length": 2000}, floes=[
+        {"shape": "square", "length": 4, "x": 20 + 19 * k, "y": 0, "thickness": 1} for k in range(100)]))
+    program = tmp_path / "place.py"
+    program.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow, os, pathlib
+ranks = sys.argv[1]
+if ranks == "2": bergtow.start_mpi()
+said = []
+with bergtow.Simulation({str(path)!r}, threads=1) as sim:
+    sim.step(2)
+    for x in (20 + 95 * 19 + 1, 20 + 95 * 19 + 8):
+        try:
+            sim.set_position(0, x, 0, 0)
+            said.append("put")
+        except bergtow.BergtowError as error:
+            said.append(str(error))
+    sim.step(2)
+    said.append(sim.state_hash)
+rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0"))
+(pathlib.Path(__file__).parent / (ranks + "-" + rank)).write_text("\\n".join(said))
+""")
+    for ranks in (1, 2):
+        done = subprocess.run([*(launcher(2) if ranks == 2 else []), sys.executable, program, str(ranks)],
+                              capture_output=True, text=True, timeout=120, env=environment(OMP_NUM_THREADS=1))
+        assert done.returncode == 0, done.stderr
+    one, *two = [(tmp_path / name).read_text().splitlines() for name in ("1-0", "2-0", "2-1")]
+    assert "would lie over body 95" in one[0] and one[1] == "put"
+    assert [lines[1:] for lines in two] == [one[1:]] * 2 and two[0][0] == one[0] and two[1][0] != "put"
+
+
+@pytest.mark.parametrize("sampling", ["grid", "latin-hypercube"])
+def test_a_range_of_angles_is_run_in_its_unit(tmp_path, sampling):
+    """Red when its values in radians are written without their unit, which is then degrees."""
+    write_case(tmp_path, changed(TOW, run__duration=2, output__window_start=0.5), "base.yml")
+    write_case(tmp_path, {"base": "base.yml", "sampling": sampling,
+                          **({"samples": 4} if sampling != "grid" else {}),
+                          "parameters": {"tow.direction": {"from": "-20 deg", "to": "20 deg",
+                                                           **({"n": 3} if sampling == "grid" else {})},
+                                         "body.yaw": {"from": 10, "to": "90 deg",
+                                                      **({"n": 2} if sampling == "grid" else {})}}}, "study.yml")
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == DONE
+    with h5py.File(tmp_path / "out/ensemble.h5") as f:
+        names = [n.decode() for n in f["members/name"][:]]
+        for key, low, high in (("tow.direction", -20, 20), ("body.yaw", 10, 90)):
+            x = np.degrees(f[f"parameters/{key}"][:])
+            if sampling == "grid":
+                assert sorted(set(np.round(x, 9))) == ([-20, 0, 20] if key == "tow.direction" else [10, 90])
+            else:  # one in each quarter
+                assert sorted(np.floor(4 * (x - low) / (high - low)).astype(int)) == [0, 1, 2, 3]
+            section, name = key.split(".")
+            for member, value in zip(names, np.radians(x)):
+                text = (tmp_path / "out/members" / member / "case.resolved.yml").read_text()
+                there = text[text.index(f"\n{section}:"):]
+                said = there[there.index(f"\n  {name}: ") + len(name) + 5:].split()
+                assert float(said[0]) == pytest.approx(value, abs=1e-12) and said[1] == "rad"
+
+
+def test_a_normal_range_of_angles_is_held_against_the_key_in_its_unit(tmp_path):
+    """95 % from 60 to 89.9 degrees reaches beyond the pole."""
+    write_case(tmp_path, changed(TOW, domain__frame="geographic", body__x=2, body__y=0), "base.yml")
+    write_case(tmp_path, {"base": "base.yml", "sampling": "latin-hypercube", "samples": 4,
+                          "parameters": {"water.latitude": {"from": "60 deg", "to": "89.9 deg",
+                                                            "distribution": "normal"}}}, "study.yml")
+    done = call("check", "study.yml", cwd=tmp_path)
+    assert done.returncode == CASE and "water.latitude: a normal distribution" in done.stderr, done.stderr
+
+
+def test_estimates_are_those_of_the_leg_in_the_window(tmp_path):
+    """A body that lies across the second leg of its course. Red when width and drag are those of the first: the drag of
+    open water is then a quarter of what the run has itself."""
+    case = changed(TOW, run__duration=80, output__window_start=60, domain__length=30, domain__width=30, ice__size=1,
+                   ice__concentration=0.05, body={"shape": "rectangle", "length": 4, "width": 1, "x": 5, "y": -10},
+                   tow={"mode": "speed", "speed": 0.2, "ramp": 2, "waypoints": [[8, -10], [8, 12]], "turn_radius": 1})
+    e, straight = (run(tmp_path, c, name=n).summary["estimates"] for n, c in (
+        ("turned", case), ("straight", case | {"tow": {"mode": "speed", "speed": 0.2, "ramp": 2, "direction": 90}})))
+    assert e["width_m"] == pytest.approx(4) and straight["width_m"] == pytest.approx(4)
+    assert e["open_water_drag"]["force_n"] == pytest.approx(straight["open_water_drag"]["force_n"], rel=1e-6)
+    across = run(tmp_path, changed(case, output__window_start=10), name="across").summary
+    assert not any(v["compares"] for v in across["estimates"].values() if isinstance(v, dict) and "compares" in v)
+    assert across["window"]["verdict"] == "not steady"
+
+
+def test_the_ordered_speed_is_that_of_the_window(tmp_path):
+    """Red when it is the largest of the programme: a tow that keeps its order looks like one at a fifth of it."""
+    tow = {"mode": "speed", "programme": [[0, 0], [2, 0.5], [10, 0.5], [12, 0.1], [60, 0.1]]}
+    e = run(tmp_path, changed(TOW, run__duration=60, output__window_start=25) | {"tow": tow}).summary["estimates"]
+    assert e["ordered_speed_m_s"] == pytest.approx(0.1) == pytest.approx(e["speed_along_m_s"])
+
+
+def test_what_no_body_has_is_asked_about(tmp_path):
+    plain = run(tmp_path, TOW, "--steps", 5, name="plain")
+    for text, word in (("body.mass=1e9 kg", "body.mass: the body has .* times the mass"),
+                       ("body.mass=1 kg", "body.mass: the body has .* times the mass"),
+                       ("impact.duration=500 s", "impact.duration: 500 s is")):
+        r = run(tmp_path, TOW, "--set", text, "--steps", 5, name=text[:11] + text[-4])
+        assert warned(r, word) and not warned(plain, word)
+
+
+def test_a_measured_force_is_above_zero(tmp_path):
+    for text in ("0 N", "-5 N"):
+        done = call("check", write_case(tmp_path, changed(TOW, reference={"mean_force": text, "source": "a book"})))
+        assert done.returncode == CASE and "reference.mean_force" in done.stderr
+
+
+def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
+    """--resolution and --speed are read by their unit alone, and refused before any run."""
+    path = write_case(tmp_path, changed(TOW, tow__mode="thrust", tow__line_length=2, tow__line_stiffness=5000,
+                                        tow__vessel={"mass": 300, "bollard_pull": 10, "free_speed": 0.5}))
+    def said(*words):
+        return script("capability.py", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
+    for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
+                         (("--resolution", "1 m"), "--resolution 1 m: is no number"),
+                         (("--speed", "0 m/s"), "--speed 0 m/s: is not above 0"),
+                         (("--speed", "3 m"), "--speed 3 m: is no number of m/s")):
+        done = said(*words)
+        assert done.returncode == 4 and wrong in done.stderr, done.stderr
+    done = said("--search", "ice.size", "--from", "0.4 m", "--to", "0.8 m", "--resolution", "5 cm", "--speed", "0.1 kn")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out/capability.json").read_text())
+    assert found["resolution"] == pytest.approx(0.05) and found["speed"] == pytest.approx(0.1 * 1852 / 3600)
+
+
+COMMA = """
+import json, locale, pathlib, sys
+sys.path.insert(0, {postproc!r})
+locale.setlocale(locale.LC_NUMERIC, "comma")
+assert locale.localeconv()["decimal_point"] == ","
+import bergtow
+result = bergtow.run("case.yml", "out")
+summary = json.loads((result.folder / "summary.json").read_text())
+assert summary["dt_s"] == 0.1 and isinstance(summary["mean_ice_resistance_n"], float)
+assert locale.localeconv()["decimal_point"] == ","
+print(summary["state_hash"])
+"""
+
+
+def test_a_program_whose_numbers_have_a_comma(tmp_path):
+    """The library within a program of another locale, as a window system may set it. Red when a writer takes that: the
+    summary is no JSON then, and ParaView reads other times."""
+    charmap = ["<code_set_name> ANSI_X3.4-1968", "<comment_char> %", "<escape_char> /", "CHARMAP",
+               *(f"<U{c:04X}> /x{c:02x} C{c}" for c in range(128)), "END CHARMAP"]
+    (tmp_path / "ascii").write_text("\n".join(charmap) + "\n")
+    (tmp_path / "numbers").write_text('LC_NUMERIC\ndecimal_point "<U002C>"\nthousands_sep ""\ngrouping -1\n'
+                                      "END LC_NUMERIC\n")
+    subprocess.run(["localedef", "-c", "-f", "./ascii", "-i", "./numbers", "./comma"], cwd=tmp_path,
+                   capture_output=True)
+    case = changed(TOW, run__duration=6, output__window_start=2)
+    write_case(tmp_path, case)
+    (tmp_path / "program.py").write_text(COMMA.format(postproc=str(ROOT / "postproc")))
+    done = subprocess.run([sys.executable, "program.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+                          env=environment(OMP_NUM_THREADS=1, LOCPATH=str(tmp_path)))
+    assert done.returncode == 0, done.stderr
+    plain = run(tmp_path, case, name="plain")
+    assert done.stdout.split() == [plain.hash]
+    for name in ("frames.xdmf", "case.resolved.yml"):
+        assert (tmp_path / "out" / name).read_text() == (plain.dir / name).read_text()
