@@ -53,7 +53,7 @@ def draw(folder, path):
     at = sorted({len(time) // 3, 2 * len(time) // 3, len(time) - 1})
     size = np.ptp(pose[0, :, :2], axis=0)
     figure, axes = plt.subplots(1, len(at), figsize=(9, 2 + 9 / len(at) * size[0] / size[1]), sharey=True,
-                                layout="constrained")
+                                layout="compressed")
     for ax, k in zip(np.atleast_1d(axes), at):
         dots = ax.scatter(pose[k, :, 1] / 1e3, pose[k, :, 0] / 1e3, c=np.minimum(speeds(time, pose, k), 0.1), s=0.3,
                           linewidths=0, vmin=0, vmax=0.1, cmap="viridis", rasterized=True)

@@ -43,6 +43,7 @@ static inline double bt_into_period(double x, double low, double period, int32_t
 {
     if (!(period > 0) || (x >= low && x < low + period)) return x;
     const double turns = floor((x - low) / period);
+    if (!(fabs(turns) < 1e9)) return x; // no number, or as good as none: guards end such a run
     x -= turns * period;
     *laps += (int32_t)turns;
     if (x >= low + period) x -= period, ++*laps; // rounding
