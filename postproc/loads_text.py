@@ -72,7 +72,7 @@ def design(s, markdown):
 def steps(s):
     """What the tensions of single steps reach, which are in no design tension; "" without a line."""
     found = {}
-    for c in s["conditions"]:
+    for c in sorted(s["conditions"], key=_governs):
         for x in c["design"]["branches"]:
             load = f", breaking load {quantity(x['breaking_load'], 'N')}" if np.isfinite(x["breaking_load"]) else ""
             found.setdefault(x["label"], []).append(f"{c['label']} {quantity(x['largest_step'], 'N')}{load}")
@@ -111,10 +111,16 @@ def qualified(some):
     return [f"{text} ({where})" if where else text for text, where in some]
 
 
+def _governs(c):
+    """Conditions by this have the largest design value first: a list that is cut keeps those that govern."""
+    tow = c["design"]["tow"] or {}
+    return -tow.get("value", tow.get("largest", 0.0))
+
+
 def warnings(s):
     """"WARNING: what is the matter: condition (how much); condition", each matter once."""
     found, every = {}, len(s["conditions"])
-    for c in s["conditions"]:
+    for c in sorted(s["conditions"], key=_governs):
         for w in c["design"]["warnings"]:
             found.setdefault(w["what"], []).append((c["label"], w["detail"]))
     out = []
@@ -135,7 +141,8 @@ def sentence(text):
 
 
 def several(some):
-    """A list of texts as one, of a long one the first alone: a page of conditions is not read."""
+    """A list of texts as one, of a long one the first alone: a page of conditions is not read. What matters most comes
+    first."""
     return "; ".join(some if len(some) <= MOST_NAMED else
                      [*some[:MOST_NAMED - 1], f"and {len(some) - MOST_NAMED + 1} more conditions"])
 

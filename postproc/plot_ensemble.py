@@ -241,7 +241,8 @@ def draw_sweep(e, key):
     rows = -(-len(shown) // columns)
     values = np.array([c.values[key] for _, some in shown for c in some])
     log_x = key == "tow.speed" and values.min() > 0
-    log_y = wants_log([v for _, some in shown for c in some for v in of(e, c.finished)]) or log_x
+    forces = [v for _, some in shown for c in some for v in of(e, c.finished)]
+    log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero has no place on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
     figure, grid = plt.subplots(rows,

@@ -231,7 +231,8 @@ class Replay:
         if run.towed is None:
             return out
         heading = tow_heading(run)
-        out["heading"] = None if heading is None or run.case.get("tow.mode") in ("line", "thrust") else heading.tolist()
+        led = heading is not None and run.case.get("tow.mode") not in ("line", "thrust")
+        out["heading"] = [tow_heading(run, run.frame_times[f]).round(6).tolist() for f in frames] if led else None
         out["follow"] = bool(needs_window(run) or out["heading"] is None and run.case.get("domain.ends") == "moving")
         out["view"], out["size"] = list(view_body(run)), body_size(run)
         lines = [tow_line(run, f, np.zeros(2)) for f in frames]
@@ -290,5 +291,5 @@ def curve(run):
     out["window_name"] = run.window_name
     out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float(
         (high - low) / 2) if np.isfinite(high - low) else None)
-    out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.summary.get("events", [])]
+    out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.events]
     return out

@@ -40,6 +40,7 @@ KEY_VALUES = {
         "impact.duration", "impact.pressure"
     ],
 }
+MOST_EVENTS = 40  #: of the table; a tow may have thousands of way-points
 UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
 #: keys of the tow that mean nothing in some modes
 ONLY = {
@@ -262,10 +263,11 @@ def quality(run):
 def events(run):
     """(rows of what happened, how many there were in all)."""
     units = {"line_broken": "N", "adrift": "m/s", "waypoint": "m"}
+    some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MOST_EVENTS]  # a line that broke before corners
     rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]),
              f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
-            for e in run.summary.get("events") or []]
-    return rows, int(run.number("n_events", len(rows)))
+            for e in sorted(some, key=lambda e: e["time_s"])]
+    return rows, len(run.events)
 
 
 def provenance(run):

@@ -81,12 +81,12 @@ def _round_steps(top):
     return sorted(ticks)
 
 
-def tow_heading(run):
-    """Unit vector of the tow direction (x, y), or None for a body that drifts."""
+def tow_heading(run, time=0.0):
+    """Unit vector (x, y) of the leg on which the towing end is at a time, or None for a body that drifts."""
     if run.towed is None or run.case.get("tow.mode") == "none":
         return None
-    angle = run.value("tow.direction", 0.0)
-    return np.array([np.cos(angle), np.sin(angle)])
+    passed = sum(e["kind"] == "waypoint" and e["time_s"] <= time for e in run.events)
+    return run.headings[min(passed, len(run.headings) - 1)]
 
 
 def body_size(run):
@@ -148,7 +148,7 @@ def tow_line(run, frame, position):
         return None
     ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
     end, points = position + ahead, []
-    broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
+    broken = {e["subject"]: e["time_s"] for e in run.events if e["kind"] == "line_broken"}
     for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
         if broken.get(branch + 1, np.inf) > at:
             hull = place(
@@ -218,8 +218,8 @@ class Scene:
         self._line = Line2D([], [], color=style.BODY_EDGE, linewidth=1.3, marker="s", markersize=4.5, markevery=[1],
                             path_effects=[patheffects.withStroke(linewidth=3, foreground=style.HALO)], zorder=5.5,
                             **kept)
-        self._body = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY, edgecolor=style.BODY_EDGE,
-                             linewidth=1.2, zorder=6, visible=run.towed is not None, **kept)
+        self._body = PolyCollection([], facecolors=style.BODY, edgecolors=style.BODY_EDGE, linewidths=1.2, zorder=6,
+                                    visible=run.towed is not None, **kept)
         self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,
                               linewidth=1.0, zorder=7, visible=False, **kept)
         self._heading = tow_heading(run)
@@ -239,7 +239,7 @@ class Scene:
         axes.add_line(self._track)
         axes.add_collection(self._solid, autolim=False)
         axes.add_line(self._line)
-        axes.add_patch(self._body)
+        axes.add_collection(self._body, autolim=False)
         axes.add_patch(self._arrow)
         for edge in edges:
             axes.add_line(edge)
@@ -276,10 +276,11 @@ class Scene:
         self._water.set_xy(self._flat(self._unbounded(self._corners) - origin))
         if run.towed is None:
             return
-        self._body.set_xy(self._flat(bodies[run.towed] - origin))
+        self._body.set_verts([self._flat(bodies[run.towed] + shift - origin) for shift in self._images])
         self._show_track(frame, origin)
         self._show_line(frame, position - origin)
         if self._heading is not None:
+            self._heading = tow_heading(run, run.frame_times[frame])
             self._show_arrow(position - origin, bodies[run.towed] - origin)
 
     def _edges(self, **kept):

@@ -321,6 +321,10 @@ def statement(e, rows, c):
     tensions = [(load["design"], load) for load in found.values()
                 if load["applies"].startswith(loads.LINE) and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
+    # a branch without a value may bear more than the one that has one
+    if worst and any(load["largest"] > worst[0]["value"] for load in found.values()
+                     if load["applies"].startswith(loads.LINE) and "value" not in load["design"]):
+        worst = None
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if not len(rows):
         counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
@@ -332,6 +336,10 @@ def statement(e, rows, c):
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
+    for load in found.values() if len(rows) else ():
+        if load["applies"].startswith(loads.LINE):  # what is said of the sample of the tow force holds here, too
+            said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
+            warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, case, lines) + warned
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],

@@ -78,6 +78,12 @@ MUTANTS = {
         ("high[k] = (int64_t)floor((bt_max(way[k], 0)", "high[k] = 0 * (int64_t)floor((bt_max(way[k], 0)",
          "piers ahead of the first lap"),
     ]),
+    "src/field/lead.c": ([EDGES, "unit/test_lead"], [
+        ("if (status == BT_OK && outside) {", "if (false) {", "floes outside the region count after a lead"),
+    ]),
+    "src/field/sizes.c": ([EDGES], [
+        ("|| !(share > LEAST_SHARE)", "", "a law of which nothing is left"),
+    ]),
     "src/run/study_values.c": ([EDGES, "cli/test_check_study.py", "cli/test_budget.py"], [
         ("kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;", "true;", "radians as degrees"),
     ]),

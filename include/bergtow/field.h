@@ -57,6 +57,9 @@ void bt_field_init(bt_field *f);
 /// Release what a field holds; f itself is the caller's.
 void bt_field_free(bt_field *f);
 
+/// Area of all floes, those outside the ice region too, m².
+double bt_field_floe_area(const bt_field *f);
+
 /// Append one floe; vertices v [nv][2] m are moved so that their centroid is the origin, and (x, y) m is shifted with
 /// them; yaw rad, thickness m. Nothing is checked: nv is 3 to BT_MAX_VERTICES, anticlockwise, and f is initialised.
 void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness);

@@ -427,7 +427,7 @@ function drawBodies(g, p, C, o) {
     g.lineWidth = 1.5;
     g.fill();
     g.stroke();
-    if (head.heading) drawArrow(g, pose, o);
+    if (head.heading) drawArrow(g, p, pose, o);
 }
 
 // Line from the hull to its towing end: a square, or a small ship, whose size is not to scale.
@@ -458,8 +458,8 @@ function drawLine(g, p, pose, o) {
     g.stroke();
 }
 
-function drawArrow(g, pose, o) {
-    const [hx, hy] = head.heading;
+function drawArrow(g, p, pose, o) {
+    const [hx, hy] = head.heading[Math.min(Math.floor(p), T - 1)];
     const ahead = (sizes) => toScreen(pose[0] + sizes * head.size * hx, pose[1] + sizes * head.size * hy, o);
     const from = ahead(0.6), to = ahead(1.2), length = Math.max(16, Math.hypot(to[0] - from[0], to[1] - from[1]));
     const d = Math.atan2(to[1] - from[1], to[0] - from[0]), c = Math.cos(d), s = Math.sin(d);

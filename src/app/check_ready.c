@@ -148,7 +148,7 @@ void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, b
     bt_case_warn_tables(c, warnings);
     bt_case_warn_body(c, warnings);
     bt_outline_warn(&f->outlines, c, warnings);
-    const double area = f->n > 0 ? f->concentration * f->ice_area : bt_case_made_area(c);
+    const double area = f->n > 0 ? bt_field_floe_area(f) : bt_case_made_area(c);
     bt_ice_warn_closed(c, area + bt_case_area_by_hand(c), warnings);
     if (n->count >= 1) bt_ice_warn(c, n->size, n->thickness, warnings);
 }

@@ -65,7 +65,7 @@ static void order_speeds(const bt_case *c, bt_estimate_input *in)
     bt_estimate_input ordered;
     double ice[2], body[2];
     const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
-    if (bt_environment_changes(c) || (walls && in->concentration < BT_BOUND_CONCENTRATION)) return;
+    if (bt_environment_changes(c) || (walls && in->concentration < BT_BOUND_CONCENTRATION - BT_MADE_OFF)) return;
     bt_setup_drift(c, 2 * in->floe_radius, in->thickness, ice, body);
     bt_estimate_ordered(c, ice, &ordered);
     in->speed = ordered.speed;

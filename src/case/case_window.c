@@ -58,6 +58,14 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
                  c->water.current_x);
         return "water.current_x";
     }
+    const double there = sign > 0 ? c->domain.x0 + length - c->body.x : c->body.x - c->domain.x0;
+    if (fabs(ahead - there) > 1e-9 * length && c->lead.mode != BT_LEAD_NONE) {
+        snprintf(why, 256,
+                 "%g m, and by domain.x0 and body.x it is %g m from the body to the front end of the domain, where the "
+                 "lead is cut; leave domain.ahead out, or give domain.x0: %g m",
+                 ahead, there, sign > 0 ? c->body.x + ahead - length : c->body.x - ahead);
+        return "domain.ahead";
+    }
     const double front = sign > 0 ? x_max : -x_min, stern = sign > 0 ? -x_min : x_max;
     if (ahead < front + room * floe || length - ahead < stern + room * floe) {
         snprintf(why, 256,

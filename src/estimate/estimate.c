@@ -7,6 +7,7 @@
 
 #include "base/elementary.h"
 #include "base/name.h"
+#include "case/arch.h"
 #include "case/case_derived.h"
 #include "force/environment.h"
 #include "bergtow/shape.h"
@@ -21,29 +22,32 @@ static bt_estimate just(double force, bool valid, const char *note)
     return (bt_estimate){.force = force, .low = force, .high = force, .valid = valid, .note = note};
 }
 
+/// Is the ice as dense as that? A field as made misses the concentration asked for by rounding.
+static bool reaches(double concentration, double limit) { return concentration >= limit - BT_MADE_OFF; }
+
 static bt_estimate lichey_hellmer(const bt_estimate_input *in)
 {
     const double a = in->concentration, strength = bt_estimate_strength(in);
-    if (a <= BT_EST_LOOSE) return just(0, true, "A <= 0.15: no force");
-    if (a >= BT_EST_DENSE && strength >= in->p_s) {
+    if (a <= BT_EST_LOOSE + BT_MADE_OFF) return just(0, true, "A <= 0.15: no force");
+    if (reaches(a, BT_EST_DENSE) && strength >= in->p_s) {
         const double limit = strength * in->width * (in->along / in->speed);
         return just(limit, true, "A >= 0.9 and P >= P_s: captured; the resistance is limited by P W");
     }
     return just(0.5 * in->ice_density * in->c_si * in->thickness * in->width * in->speed * in->along, true,
-                a >= BT_EST_DENSE ? "A >= 0.9 and P < P_s: drag of the ice" : "0.15 < A < 0.9: drag of the ice");
+                reaches(a, BT_EST_DENSE) ? "A >= 0.9 and P < P_s: drag of the ice" : "0.15 < A < 0.9: drag of the ice");
 }
 
 static const char has_room[] = "A < 0.65 (assumed): the ice has room to give way";
 
 static bt_estimate compaction(const bt_estimate_input *in)
 {
-    const bool compact = in->concentration >= BT_EST_COMPACT;
+    const bool compact = reaches(in->concentration, BT_EST_COMPACT);
     return just(bt_estimate_strength(in) * in->width, compact, compact ? "A >= 0.65: compact ice" : has_room);
 }
 
 static bt_estimate rafting(const bt_estimate_input *in)
 {
-    const bool compact = in->concentration >= BT_EST_COMPACT;
+    const bool compact = reaches(in->concentration, BT_EST_COMPACT);
     const double lift = 0.5 * bt_case_rise(in->ice_density, in->water_density) * in->thickness * in->thickness *
                         in->concentration * in->width;
     return (bt_estimate){.force = in->kappa * lift,
@@ -95,7 +99,7 @@ static bt_estimate open_water(const bt_estimate_input *in)
 }
 
 /// Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9.
-static bool is_dense(const bt_estimate_input *in) { return in->concentration >= BT_EST_DENSE; }
+static bool is_dense(const bt_estimate_input *in) { return reaches(in->concentration, BT_EST_DENSE); }
 
 // --- the registry ----------------------------------------------------------------------------------------------------
 
@@ -191,14 +195,14 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 }
 
 // Mean diameter weighted with area, <d³>/<d²>. Power law: density ∝ d^(−a−1) on [lo, hi]; lognormal with mean m and
-// relative spread s: <d^k> = m^k (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: the moments of a symmetric spread, m (1 +
-// 3s²)/(1 + s²). Truncation is left out.
+// relative spread s: <d^k> = m^k (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: a gamma law (field/sizes.c), <d²> =
+// m² (1 + s²), <d³> = m³ (1 + s²) (1 + 2s²), so m (1 + 2s²). Truncation is left out.
 static double weighted_size(const bt_case *c)
 {
     const double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max,
                  s2 = c->ice.size_spread * c->ice.size_spread;
     if (c->ice.size_law == BT_SIZE_LOGNORMAL) return c->ice.size * (1 + s2) * (1 + s2);
-    if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 3 * s2) / (1 + s2);
+    if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 2 * s2);
     const double top = fabs(a - 3) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 3 - a) - bt_pow(lo, 3 - a)) / (3 - a);
     const double bottom = fabs(a - 2) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 2 - a) - bt_pow(lo, 2 - a)) / (2 - a);
     return top / bottom;

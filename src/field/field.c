@@ -43,6 +43,13 @@ static void reserve(bt_field *f, int64_t floes, int64_t n_vertices)
     }
 }
 
+double bt_field_floe_area(const bt_field *f)
+{
+    double area = 0;
+    for (bt_idx i = 0; i < f->n; i++) area += f->area[i];
+    return area;
+}
+
 double bt_field_mean_size(const bt_field *f)
 {
     double sum = 0;

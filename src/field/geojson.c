@@ -45,7 +45,7 @@ typedef enum { DEGREES, PLANE, FRAME } coordinates;
 
 /// All coordinates of a file, as they stand there.
 typedef struct survey {
-    double low[3], high[3]; ///< first, second, first from 0° on
+    double low[4], high[4]; ///< first, second, first from 0° on, first up to 180°
     size_t feature;         ///< the first that is not a place in degrees; SIZE_MAX: none
     double odd[2];          ///< its vertex
 } survey;
@@ -131,15 +131,17 @@ static int coordinates_of(bt_features *features, size_t i, double *v, const char
 /// A vertex of feature i into the survey.
 static void see(survey *b, size_t i, double x, double y, double lon)
 {
-    const double q[3] = {x, y, x < 0 ? x + 360 : x};
-    for (int a = 0; a < 3; a++) b->low[a] = bt_min(b->low[a], q[a]), b->high[a] = bt_max(b->high[a], q[a]);
+    const double q[4] = {x, y, x < 0 ? x + 360 : x, x > 180 ? x - 360 : x};
+    for (int a = 0; a < 4; a++) b->low[a] = bt_min(b->low[a], q[a]), b->high[a] = bt_max(b->high[a], q[a]);
     if (b->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90)) b->feature = i, b->odd[0] = x, b->odd[1] = y;
 }
 
 /// Box of all coordinates; lon: the farthest longitude that is one.
 static survey look_over(bt_features *features, double lon)
 {
-    survey b = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}, .feature = SIZE_MAX};
+    survey b = {.low = {INFINITY, INFINITY, INFINITY, INFINITY},
+                .high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
+                .feature = SIZE_MAX};
     for (size_t i = 0; i < features->n; i++) {
         const char *why;
         size_t n;
@@ -190,7 +192,8 @@ static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
                          : "correct it, or say what its coordinates are");
         return;
     }
-    const int a = b.high[2] - b.low[2] < b.high[0] - b.low[0] ? 2 : 0;
+    int a = b.high[2] - b.low[2] < b.high[0] - b.low[0] ? 2 : 0;
+    if (b.high[3] - b.low[3] < b.high[a] - b.low[a]) a = 3;
     double middle[2] = {(b.low[a] + b.high[a]) / 2, (b.low[1] + b.high[1]) / 2};
     if (!(b.low[0] <= b.high[0])) middle[0] = middle[1] = 0; // no place at all
     // No sea ice is there, and the other way round it could be: nearest to the equator is the ice of the Bohai Sea, at

@@ -236,9 +236,8 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
             else if (l->mode == BT_LEAD_MANAGED) cut_floe(&s, f, i, &out);
             for (bt_idx p = first; taken[i] && p < out.n; p++, st->pieces++) pieces += sqrt(4 * out.area[p] / BT_PI);
         }
-        double area = 0;
-        for (bt_idx i = 0; i < out.n; i++) area += out.area[i];
-        out.concentration = st->concentration_after = f->ice_area > 0 ? area / f->ice_area : 0;
+        out.concentration = st->concentration_after =
+            f->ice_area > 0 ? bt_field_floe_area(&out) / f->ice_area : 0;
         st->mean_piece = st->pieces > 0 ? pieces / (double)st->pieces : 0;
         out.outlines = f->outlines;
         bt_field_free(f);
@@ -247,6 +246,24 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
     free(taken);
     free(s.parts);
     return status;
+}
+
+/// Area of the floes within the ice region, m²: of ice that was read a part may lie outside, which is no part of a
+/// concentration in it.
+static double area_in_region(const bt_case *c, const bt_region *y, const bt_field *f)
+{
+    double area = 0, v[2 * BT_MAX_VERTICES];
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double *p = f->pose + 3 * (size_t)i, s = bt_sin(p[2]), k = bt_cos(p[2]);
+        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+        for (int j = 0; j < n; j++) {
+            const double *own = f->vertices + 2 * (f->offsets[i] + j);
+            v[2 * j] = p[0] + k * own[0] - s * own[1];
+            v[2 * j + 1] = p[1] + s * own[0] + k * own[1];
+        }
+        area += bt_region_area_of(y, c, n, v);
+    }
+    return area;
 }
 
 /// The points of a path, and how much of its length is left.
@@ -331,8 +348,16 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
         .round_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
     };
-    const bt_status status = bt_lead_cut(&l, f, s, err);
+    const double whole = bt_field_floe_area(f);
+    const bool outside = whole - f->concentration * f->ice_area > 1e-9 * whole;
+    bt_status status = bt_lead_cut(&l, f, s, err);
     free(path);
+    if (status == BT_OK && outside) {
+        bt_region y;
+        status = bt_region_init(&y, c, 0, err);
+        if (status == BT_OK) f->concentration = s->concentration_after = area_in_region(c, &y, f) / y.ice_area;
+        bt_region_free(&y);
+    }
     return status;
 }
 

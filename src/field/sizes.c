@@ -15,6 +15,8 @@
 #include "base/rng.h"
 #include "case/case_derived.h"
 
+#define LEAST_SHARE 1e-3 // of a law that its limits leave
+
 static double normal_cdf(double x) { return 0.5 * bt_erfc(-x / sqrt(2)); }
 
 // E[d^k; low < d < high] / P(low < d < high) of the lognormal law: completing the square shifts the limits by kσ.
@@ -71,7 +73,10 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
         *(lognormal_moment(s, s->mu, 1) < s->mean ? &low : &high) = s->mu;
     }
     double mean = lognormal_moment(s, s->mu, 1);
-    if (!(fabs(mean - s->mean) < 1e-6 * s->mean)) {
+    // of all that is drawn, what lies between the limits: the rest is drawn again
+    const double share = normal_cdf(s->max > 0 ? (bt_log(s->max) - s->mu) / s->sigma : INFINITY) -
+                         normal_cdf(s->min > 0 ? (bt_log(s->min) - s->mu) / s->sigma : -INFINITY);
+    if (!(fabs(mean - s->mean) < 1e-6 * s->mean) || !(share > LEAST_SHARE)) {
         bt_errors_add(
             err,
             "%s: ice.size: no lognormal law cut at %g..%g m has the mean %g m and spread %g; move the limits apart",

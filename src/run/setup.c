@@ -239,7 +239,8 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
 /// Along which axes undisturbed ice rests, as step/undisturbed.h says.
 static void held_ice(const bt_case *c, double concentration, bool held[2])
 {
-    const bool dense = concentration >= BT_BOUND_CONCENTRATION, moving = c->domain.ends == BT_BOUND_MOVING;
+    const bool dense = concentration >= BT_BOUND_CONCENTRATION - BT_MADE_OFF,
+               moving = c->domain.ends == BT_BOUND_MOVING;
     held[0] = dense && c->domain.ends == BT_BOUND_WALL;
     held[1] = (dense || moving) && c->domain.sides == BT_BOUND_WALL;
 }
@@ -422,7 +423,7 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
 /// Walls that leave less room than the ice takes end any run; who has set guard.overlap: 0 wants to see it.
 static bool check_closing(const bt_case *c, const bt_field *f, bt_errors *err)
 {
-    const double made = f->n > 0 ? f->concentration * f->ice_area : bt_case_made_area(c),
+    const double made = f->n > 0 ? bt_field_floe_area(f) : bt_case_made_area(c),
                  closed = bt_ice_closed(c, made + bt_case_area_by_hand(c));
     if (!(closed >= 1) || c->guard.overlap == 0) return true;
     char how[64] = "none beside the body";

@@ -231,3 +231,67 @@ def test_a_program_whose_numbers_have_a_comma(tmp_path):
     assert done.stdout.split() == [plain.hash]
     for name in ("frames.xdmf", "case.resolved.yml"):
         assert (tmp_path / "out" / name).read_text() == (plain.dir / name).read_text()
+
+
+def outlines(floes):
+    """A map of squares in metres, (east, north, side)."""
+    crs = {"type": "name", "properties": {"name": "bergtow:plane"}}
+    return {"type": "FeatureCollection", "crs": crs, "features": [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
+            [[x, y], [x + a, y], [x + a, y + a], [x, y + a], [x, y]]]}} for x, y, a in floes]}
+
+
+def test_a_lead_leaves_the_concentration_of_the_region_as_it_is(tmp_path):
+    """Ice that was read, two thirds of it outside the region, and a managed lead, which takes none away. Red when all
+    floes count afterwards: a concentration above 1, which no checkpoint goes on from."""
+    (tmp_path / "map.json").write_text(json.dumps(outlines(
+        [(60 * i - 570, 60 * j - 570, 50) for i in range(20) for j in range(20) if abs(60 * i - 570) > 60 or j > 8])))
+    case = {"run": {"dt": 1, "duration": 60}, "domain": {"frame": "geographic", "x0": -600, "y0": -600, "length": 1200,
+                                                         "width": 1200, "ends": "open", "sides": "open"},
+            "ice": {"outlines": "map.json", "outlines_crs": "plane", "thickness": 1, "x_min": -300, "x_max": 300,
+                    "y_min": -300, "y_max": 300},
+            "body": {"shape": "disc", "length": 40, "draft": 20, "x": -150, "y": 0},
+            "tow": {"mode": "speed", "speed": 0.5},
+            "water": {"latitude": 75},
+            "lead": {"mode": "managed", "floe_size": 20, "width": 60, "length": 300}}
+    lead = run(tmp_path, case, "--steps", 20).summary["lead"]
+    assert lead["pieces"] > 5 and 0 < lead["concentration_before"] < 1
+    assert lead["concentration_after"] == pytest.approx(lead["concentration_before"], rel=2e-3)
+    assert call("resume", tmp_path / "out", "--quiet").returncode == DONE
+
+
+def test_rounding_of_the_concentration_decides_nothing(tmp_path):
+    """75 and 65 %, in fields that miss them by a bit. Red when the bit decides: ice is held by the walls or drifts,
+    estimates hold and do not, from seed to seed."""
+    case = changed(TOW, run__duration=1, run__dt=0.1, output__window_start=0.3, ice__concentration=0.75,
+                   water={"current_x": 0.05})
+    found = [run(tmp_path, case, "--set", f"ice.seed={k}", name=f"s{k}").summary["estimates"] for k in range(1, 7)]
+    assert {e["concentration"] for e in found} != {0.75}
+    assert np.ptp([e["speed_along_m_s"] for e in found]) < 1e-9
+    found = [run(tmp_path, changed(case, ice__concentration=0.65), "--set", f"ice.seed={k}", name=f"t{k}").summary[
+        "estimates"] for k in range(1, 7)]
+    assert {e["marchenko_rafting"]["valid"] for e in found} == {True}
+
+
+def test_ice_at_greenwich_with_longitudes_to_360(tmp_path):
+    features = outlines([])
+    for i in range(6):
+        x = (359.99 + 0.005 * i) % 360
+        ring = [[x, 80], [x + 0.002, 80], [x + 0.002, 80.0004], [x, 80.0004], [x, 80]]
+        features["features"].append({"type": "Feature", "properties": {},
+                                     "geometry": {"type": "Polygon", "coordinates": [ring]}})
+    del features["crs"]
+    (tmp_path / "map.json").write_text(json.dumps(features))
+    case = {"run": {"dt": 1, "duration": 60}, "domain": {"frame": "geographic", "x0": -600, "y0": -600, "length": 1200,
+                                                         "width": 1200, "ends": "open", "sides": "open"},
+            "ice": {"outlines": "map.json", "outlines_crs": "lonlat", "thickness": 1}, "body": {"shape": "none"},
+            "tow": {"mode": "none"}, "water": {"latitude": 80}}
+    done = call("check", write_case(tmp_path, case))
+    assert done.returncode == DONE and "0 E" not in done.stderr, done.stderr
+
+
+def test_what_leaves_no_sizes_is_refused(tmp_path):
+    """Limits so narrow that nearly all sizes are drawn again. Red when check calls it cheap and it is never done."""
+    ice = {"size_law": "lognormal", "size": 1, "size_spread": 1, "size_min": 0.9999999, "size_max": 1.0000001}
+    done = call("field", write_case(tmp_path, changed(TOW, ice=ice)), "-o", tmp_path / "f.h5", timeout=30)
+    assert done.returncode == CASE and "move the limits apart" in done.stderr

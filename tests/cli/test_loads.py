@@ -393,6 +393,40 @@ def test_the_branch_that_bears_more_is_designed_for(statement):
     assert second["said"]["value"] == second["line_tension_2"] > second["line_tension_1"]
 
 
+def test_what_speaks_against_a_design_tension_is_named_as_of_the_tow_force(statement):
+    """Red when the sample of the tow force alone is looked at, or a branch without a value is passed over."""
+    folder, _, s = statement
+    e, c = Ensemble(folder), known(s["conditions"][1])
+    said = lambda c: statement_module.statement(e, e.conditions()[1].finished, c)  # noqa: E731
+    first, second = (c["loads"][name] for name in LOADED[2:])
+    before, label = said(c), second["label"]
+    assert before["tension"]["label"] == label
+    second |= {"alike_p": 1e-6, "start_up": {"largest": 9e9, "time_s": 600.0}}
+    more = [w["what"] for w in said(c)["warnings"] if w not in before["warnings"]]
+    assert any(what.startswith(f"{label}: the fields differ") for what in more)
+    assert any(what.startswith(f"{label}: the start, which is left out") for what in more)
+    second["design"] = {"refused": "too few clusters", "probability": 0.05, "tow_hours": 24, "return_hours": 468}
+    assert said(c)["tension"] is None
+    assert {"what": f"{label}: no value", "detail": "too few clusters"} in said(c)["warnings"]
+    second["largest"] = 0.5 * first["design"]["value"]
+    assert said(c)["tension"]["label"] == first["label"]
+
+
+def known(found):
+    """A part of statistics.json as it was before it was written: NaN for null."""
+    if isinstance(found, dict):
+        return {key: known(value) for key, value in found.items()}
+    return [known(value) for value in found] if isinstance(found, list) else np.nan if found is None else found
+
+
+def test_a_warning_of_many_conditions_names_those_that_govern():
+    """Red when the first of the study stand for all: its mildest ice."""
+    conditions = [{"label": f"ice {k}", "values": {}, "units": {}, "design": {
+        "tow": {"value": float(k)}, "warnings": [{"what": "not steady", "detail": str(k)}]}} for k in range(9)]
+    line, = loads_text.warnings({"conditions": conditions})
+    assert "ice 8 (8); ice 7 (7)" in line and "and 5 more" in line and "ice 0" not in line
+
+
 def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     folder, text, s = statement
     lines = text.splitlines()

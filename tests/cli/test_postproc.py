@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import matplotlib
@@ -20,6 +21,7 @@ import bergtow_read  # noqa: E402
 import plot_field  # noqa: E402
 import plot_force  # noqa: E402
 import report_run  # noqa: E402
+import scene  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 
@@ -402,8 +404,33 @@ def test_field_panels_show_first_middle_and_last_frame(tmp_path):
         axes = plot_field.draw(run).axes[:3]
         assert [a.get_title(loc="left") for a in axes] == ["before, t = 0", "during, t = 5.00 s", "after, t = 10.0 s"]
         for a, x in zip(axes, (0.0, 4.0, 16.0)):
-            bodies = [p for p in a.patches if p.get_facecolor() == matplotlib.colors.to_rgba(style.BODY)]
-            assert len(bodies) == 1 and np.allclose(bodies[0].get_xy()[:4], HULL + [x, 0.0], rtol=0, atol=1e-12)
+            colour = matplotlib.colors.to_rgba(style.BODY)
+            bodies = [p for c in a.collections for p in c.get_paths()
+                      if len(c.get_facecolor()) and tuple(c.get_facecolor()[0]) == colour]
+            assert len(bodies) == 1 and np.allclose(bodies[0].vertices[:4], HULL + [x, 0.0], rtol=0, atol=1e-12)
+
+
+def test_the_arrow_goes_along_the_leg_at_hand():
+    """And a line that broke is not drawn again, however many way-points came before. Red when the first leg, or the
+    first 40 events, stand for the run."""
+    corners = [{"time_s": 10.0 * (k + 1), "kind": "waypoint", "subject": k + 1} for k in range(3)]
+    run = SimpleNamespace(towed=0, case={"tow.mode": "speed"}, events=corners,
+                          headings=np.array([[1, 0], [0, 1], [-1, 0]], dtype=float))
+    for time, leg in ((0, 0), (9.9, 0), (10, 1), (25, 2), (99, 2)):
+        assert np.array_equal(scene.tow_heading(run, time), run.headings[leg])
+    events = [{"time_s": float(k), "kind": "waypoint", "subject": k} for k in range(45)]
+    events.append({"time_s": 50.0, "kind": "line_broken", "subject": 1, "value": 1e3})
+
+    class Line(SimpleNamespace):
+        def __getitem__(self, name):
+            return np.array([0.0, 100.0]) if name == "time" else np.full(2, float(len(name)))
+
+    line = Line(case={"tow.mode": "line"}, frame_times=[40.0, 60.0], events=events, towed=0,
+                series_names=["carriage_x", "carriage_y", "body_x", "body_y"],
+                value=lambda key, preset: preset, body_pose=lambda frame: np.zeros((1, 3)))
+    assert [len(scene.tow_line(line, frame, np.zeros(2))) for frame in (0, 1)] == [2, 1]
+    rows, n = report_run.events(SimpleNamespace(events=[e | {"value": None} for e in events]))
+    assert n == 46 and len(rows) == 40 and any("line broken" in row for row in rows)
 
 
 def test_a_moving_window_is_shown_about_the_body(tmp_path):

@@ -50,7 +50,9 @@ static void lichey_hellmer_in_its_regimes(void **state)
     (void)state;
     bt_estimate_input in = berg(0.15);
     CHECK(LICHEY_HELLMER, in, 0, true); // the threshold itself has no force
-    in = berg(nextafter(0.15, 1));
+    in = berg(nextafter(0.15, 1)); // nor is what rounding may have made of it
+    CHECK(LICHEY_HELLMER, in, 0, true);
+    in = berg(0.1501);
     CHECK(LICHEY_HELLMER, in, 9100, true);
     in = berg(0.8);
     CHECK(LICHEY_HELLMER, in, 9100, true);
@@ -65,7 +67,7 @@ static void lichey_hellmer_in_its_regimes(void **state)
     in = berg(0.9);
     in.thickness = 5; // P = 100 000 / e² = 13 534 N/m
     CHECK(LICHEY_HELLMER, in, 100e3 * 80 * 0.1353352832366127, true);
-    in.concentration = nextafter(0.9, 0); // strong enough, and not dense enough
+    in.concentration = 0.9 - 1e-6; // strong enough, and not dense enough
     CHECK(LICHEY_HELLMER, in, 45500, true);
     in.concentration = 0.9;
     in.p_s = bt_estimate_strength(&in); // P = P_s counts as captured
