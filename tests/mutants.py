@@ -9,7 +9,8 @@ import collections
 import pathlib
 import sys
 
-EDGES = "cli/test_edges.py"
+EDGES = "cli/test_edges.py::test_"
+PUT = "cli/test_python_stepping.py::test_"
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
 PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
@@ -58,33 +59,38 @@ MUTANTS = {
         ("((double)w->step + 0.5) * w->par.dt", "((double)w->step + 1) * w->par.dt", "forces at the end of the step"),
         ("if (law->towed_only && !b->towed) return;", "", "a tow's law on every floe"),
     ]),
-    "src/body/bodies.h": (["physics/test_motion", EDGES,
+    "src/body/bodies.h": (["physics/test_motion", EDGES + "floes_stay_in_the_domain_however_far_they_go_in_a_step",
                           "scenes:periodic_dense,free_drift", "parallel/test_window.py"], [
         ("const double turns = floor((x - low) / period);", "const double turns = x < low ? -1 : 1;",
          "one period a step"),
         ("*laps += (int32_t)turns;", "", "laps are not counted"),
     ]),
-    "src/body/bodies.c": ([EDGES, "parallel/test_window.py", "cli/test_python_stepping.py"], [
+    "src/body/bodies.c": ([EDGES + "a_place_is_taken_on_all_ranks_or_on_none",
+                           "parallel/test_window.py", "cli/test_python_stepping.py"], [
         ("deepest = bt_max(deepest, -bt_apart_of(", "deepest = bt_max(deepest, +bt_apart_of(", "places far from all"),
     ]),
-    "src/step/edit.c": ([EDGES, "cli/test_python_stepping.py"], [
+    "src/step/edit.c": ([EDGES + "a_place_is_taken_on_all_ranks_or_on_none",
+                         PUT + "bodies_are_changed_by_hand_within_limits", "cli/test_python_stepping.py"], [
         ("bt_domain_maxima(w, &found, 1);", "", "ranks disagree on a place"),
         ("if (b->gid[j] == gid ||", "if (", "a body in its own way"),
         ("turned[2 * k + 1] = s * v[0] + c * v[1];", "turned[2 * k + 1] = v[1];", "the outline is not turned"),
         ("w->tow->travel_x += to[0] - p->x;", "", "the way of a body that is put elsewhere"),
     ]),
-    "src/run/setup.c": ([EDGES, "cli/test_tow.py"], [
-        ("thick = bt_max(thick, 1.1 * w->bodies.radius[i]);", "", "walls end at the seam"),
+    "src/run/setup.c": ([EDGES + "a_wall_goes_on_around_the_period_as_far_as_a_long_body_reaches",
+                         EDGES + "a_pier_is_met_on_any_lap", "cli/test_tow.py"], [
+        ("thick = bt_max(thick, 1.1 * w->bodies.radius[i]);", "thick = bt_max(thick, 0 * w->bodies.radius[i]);",
+         "walls end at the seam"),
         ("high[k] = (int64_t)floor((bt_max(way[k], 0)", "high[k] = 0 * (int64_t)floor((bt_max(way[k], 0)",
          "piers ahead of the first lap"),
     ]),
-    "src/field/lead.c": ([EDGES, "unit/test_lead"], [
+    "src/field/lead.c": ([EDGES + "a_lead_leaves_the_concentration_of_the_region_as_it_is", "unit/test_lead"], [
         ("if (status == BT_OK && outside) {", "if (false) {", "floes outside the region count after a lead"),
     ]),
-    "src/field/sizes.c": ([EDGES], [
+    "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused"], [
         ("|| !(share > LEAST_SHARE)", "", "a law of which nothing is left"),
     ]),
-    "src/run/study_values.c": ([EDGES, "cli/test_check_study.py", "cli/test_budget.py"], [
+    "src/run/study_values.c": ([EDGES + "a_range_of_angles_is_run_in_its_unit",
+                                "cli/test_check_study.py", "cli/test_budget.py"], [
         ("kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;", "true;", "radians as degrees"),
     ]),
     "src/force/forces.c": (DRAG + ["unit/test_cells"], [
@@ -470,7 +476,8 @@ MUTANTS = {
         ("bt_atan2(q[1] - q[-1], q[0] - q[-2])", "c->tow.direction", "legs after the first"),
         ("if (!worst.key || narrower(&a, &worst)) worst = a;", "if (!worst.key) worst = a;", "the first pair decides"),
     ]),
-    "src/output/summary.c": (["unit/test_summary", EDGES], [
+    "src/output/summary.c": (["unit/test_summary", EDGES + "estimates_are_those_of_the_leg_in_the_window",
+                             EDGES + "the_ordered_speed_is_that_of_the_window"], [
         ("straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);", "",
          "width across the first leg"),
         ("in->turns = turns;", "", "a turn in the window is held against estimates"),

@@ -194,6 +194,8 @@ def fails(tree, test):
         make(tree, "build/release/tests/parallel/broken_division")
     if "copies" in test:
         make(tree, "build/release/tests/parallel/copies")
+    if "edges" in test or "python" in test:
+        make(tree, "lib")
     code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow",
                      f"tests/{test}"], tree, PATIENCE["pytest"])
     return None if code == 0 else test
