@@ -49,9 +49,9 @@ def samples(e, rows, members):
     All fields are thinned alike, by the median of their tau. Each by its own would give a field the weight 1/tau, and
     one that meets no ice, whose tau is that of a constant, nearly all of it.
     """
-    every = [x for x in map(e.steady, rows) if len(x)]
-    taus = [members[m]["tau_samples"] for m in rows if len(e.steady(m)) and np.ptp(e.steady(m)) > 0]
-    taus = [tau for tau in taus if np.isfinite(tau)]
+    found = [(e.steady(m), members[m]["tau_samples"]) for m in rows]
+    every = [x for x, _ in found if len(x)]
+    taus = [tau for x, tau in found if len(x) and np.ptp(x) > 0 and np.isfinite(tau)]
     stride = max(1, int(np.ceil(2 * np.median(taus)))) if taus else 1
     thinned = np.concatenate([x[::stride] for x in every]) if every else np.zeros(0)
     above = thinned[thinned > 0]

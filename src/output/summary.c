@@ -241,6 +241,8 @@ static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input
             bt_path_at(&path, from, a, first);
             bt_path_at(&path, to, b, last);
             straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);
+            // at a set speed a body keeps its yaw; on a line it follows its course, as in src/case/arch.c
+            if (c->tow.mode != BT_TOW_SPEED) straight.body.yaw += straight.tow.direction - c->tow.direction;
             turns = fabs(first[0] * last[1] - first[1] * last[0]) > BT_TURN;
             bt_path_free(&path);
         }
