@@ -137,7 +137,6 @@ def from_layer(path, source, how):
         others = sum(len(names) for names in found.skipped.values())
         raise RunError(path, f"holds no polygons ({others} features of other kinds)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
-    mark_cut(found)
     return found
 
 
@@ -228,12 +227,17 @@ def about_of(path, source, layer=None):
     return next((" ".join(str(text).split()) for text in texts if text), "")
 
 
-def mark_cut(found):
-    """Outlines have no image; where the edges of several lie on one side of the box of all, it was one's edge."""
+def mark_cut(found, degrees):
+    """Outlines have no image; where the edges of several lie on one side of the box of all, it was one's edge. But the
+    180th meridian, at which files in degrees part floes (RFC 7946), ends no map."""
+    if found.seen is not None:
+        return
     bounds = np.array([s.geometry.bounds for s in found.shapes])
     sides = np.r_[bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)]
     near = 1e-9 * max(sides[2] - sides[0], sides[3] - sides[1])
     for k in range(4):
+        if degrees and k % 2 == 0 and abs(abs(sides[k]) - 180) <= near:
+            continue
         lying = [s for s, b in zip(found.shapes, bounds)
                  if abs(b[k] - sides[k]) <= near and lies_on(s.geometry, k % 2, sides[k], near)]
         for shape in lying if len(lying) > 1 else []:

@@ -247,6 +247,7 @@ def main(argv=None):
     found = map_read.read(a.map, how)
     crs = map_plane.system(found.path, found.crs, a.crs)
     plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
+    map_read.mark_cut(found, degrees=not isinstance(crs, str) and crs.is_geographic)
     book = map_repair.Ledger()
     for why, names in found.skipped.items():
         for name in names:

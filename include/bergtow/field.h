@@ -91,8 +91,18 @@ bool bt_field_outlines_ours(const char *path);
 /// projection leaves uncorrected, a latitude that is not the case's.
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings);
 
-/// Warning of ice that was made: n floes whose mean diameter, m, is not that of the size law.
-void bt_field_size_warn(const bt_case *c, bt_idx n, double mean_size, bt_errors *warnings);
+/// Sizes of the floes of a field: diameters of circles of their areas.
+typedef struct bt_field_sizes {
+    bt_idx n;     ///< floes
+    double mean;  ///< m; NaN without floes
+    double least; ///< m; infinite without floes
+    bt_idx below; ///< floes of ice that was made that are smaller than its ice.size_min
+} bt_field_sizes;
+/// Those of field f of case c. Pieces of a lead (ice.lead) are not counted as below.
+bt_field_sizes bt_field_sizes_of(const bt_case *c, const bt_field *f);
+
+/// Warnings of ice that was made: a mean diameter that is not that of the size law, floes below its lower limit.
+void bt_field_size_warn(const bt_case *c, const bt_field_sizes *s, bt_errors *warnings);
 
 /// Mean diameter of the circles of the floes' areas, m; NaN without floes.
 double bt_field_mean_size(const bt_field *f);

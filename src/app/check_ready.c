@@ -18,16 +18,10 @@
 
 static bt_check_ice ice_of_case(const bt_case *c)
 {
-    bt_check_ice n = {.count = bt_case_expected_floes(c) + c->n_floes,
-                      .size = c->ice.size,
-                      .thickness = c->ice.thickness,
-                      .concentration = c->ice.concentration};
-    if (c->ice.size_law == BT_SIZE_POWER) {
-        double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
-        n.size = (fabs(a - 1) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 1 - a) - bt_pow(lo, 1 - a)) / (1 - a)) /
-                 ((bt_pow(lo, -a) - bt_pow(hi, -a)) / a);
-    }
-    return n;
+    return (bt_check_ice){.count = bt_case_expected_floes(c) + c->n_floes,
+                          .size = bt_case_mean_size(c),
+                          .thickness = c->ice.thickness,
+                          .concentration = c->ice.concentration};
 }
 
 static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)

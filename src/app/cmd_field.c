@@ -85,11 +85,12 @@ int bt_cmd_field(int argc, char **argv)
         status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     bt_errors warnings = {0};
     if (status == BT_OK) {
-        const double took = bt_clock() - start, size = bt_field_mean_size(&f);
+        const double took = bt_clock() - start;
+        const bt_field_sizes sizes = bt_field_sizes_of(&c, &f);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
-               f.concentration, f.ice_area, size, bt_case_reads_field(&c) ? "read" : "made", took);
+               f.concentration, f.ice_area, sizes.mean, bt_case_reads_field(&c) ? "read" : "made", took);
         bt_outline_warn(&f.outlines, &c, &warnings);
-        bt_field_size_warn(&c, f.n, size, &warnings);
+        bt_field_size_warn(&c, &sizes, &warnings);
     }
     for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);
     bt_errors_free(&warnings);

@@ -409,8 +409,8 @@ static void check_path(const check *k, int n, const double *v)
     // vessel may be slower. way-points: case_tow.c
     const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0;
     if (!straight || !(c->run.duration > 0) ||
-        !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme domain.ends_closing "
-                           "domain.sides_closing"))
+        !bt_check_sound(k, "run.dt run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme "
+                           "domain.ends_closing domain.sides_closing"))
         return;
     double way = bt_case_tow_led(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     const box b = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);

@@ -46,15 +46,23 @@ int bt_case_floe_outline(const bt_floe_def *f, double *v)
     return bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
 }
 
-// Mean square diameter of the floes. For a power law N(>d) ~ d^−a on [lo, hi] the density is ∝ d^(−a−1), so
-// <d²> = ∫ d^(1−a) / ∫ d^(−a−1).
+double bt_case_power_moment(const bt_case *c, int k)
+{
+    const double e = k - c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
+    return fabs(e) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, e) - bt_pow(lo, e)) / e;
+}
+
+double bt_case_mean_size(const bt_case *c)
+{
+    if (c->ice.size_law != BT_SIZE_POWER || bt_case_reads_field(c)) return c->ice.size;
+    return bt_case_power_moment(c, 1) / bt_case_power_moment(c, 0);
+}
+
 static double mean_square_size(const bt_case *c)
 {
-    double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
     if (c->ice.size_law != BT_SIZE_POWER)
         return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
-    double top = fabs(a - 2) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 2 - a) - bt_pow(lo, 2 - a)) / (2 - a);
-    return top / ((bt_pow(lo, -a) - bt_pow(hi, -a)) / a);
+    return bt_case_power_moment(c, 2) / bt_case_power_moment(c, 0);
 }
 
 bool bt_case_ice_is_random(const bt_case *c)

@@ -31,7 +31,7 @@ enum { RULES = 25 };
 static void list(const bt_case *c, idle out[RULES])
 {
     const bool read = bt_case_reads_field(c), power = c->ice.size_law == BT_SIZE_POWER;
-    // a moving window has its room in floes of ice.size, whatever the ice (case_window.c)
+    // of ice that is read a moving window has its room in floes of ice.size (case_window.c)
     const bool sized = c->domain.ends == BT_BOUND_MOVING;
     const bool line = c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST;
     const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
@@ -52,7 +52,7 @@ static void list(const bt_case *c, idle out[RULES])
         {!read && c->ice.size_law == BT_SIZE_SINGLE, "ice.size_min ice.size_max", "ice.size_law",
          "with ice.size_law: single"},
         {!read && !power, "ice.size_exponent", "ice.size_law", "without ice.size_law: power"},
-        {!read && power, sized ? "ice.size_spread" : "ice.size ice.size_spread", "ice.size_law",
+        {!read && power, "ice.size ice.size_spread", "ice.size_law",
          "with ice.size_law: power, whose sizes follow from ice.size_min, size_max and size_exponent"},
         {!read, c->ice.shape == BT_ICE_RECTANGLES ? "ice.sides"
                 : c->ice.shape == BT_ICE_POLYGONS ? "ice.aspect"
@@ -63,8 +63,8 @@ static void list(const bt_case *c, idle out[RULES])
         {c->body.shape == BT_BODY_POLYGON, "body.length body.width", "body.shape",
          "on the waterline of body.vertices (body.shape: polygon)"},
         {c->body.shape == BT_BODY_ABSENT,
-         "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail body.density "
-         "body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
+         "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail "
+         "body.density body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
          "body.drag.water_skin body.drag.air_form body.drag.air_skin",
          "body.shape", "without a towed body (body.shape: none)"},
         {c->body.shape == BT_BODY_ABSENT, "tow.ramp", "body.shape", "without a body that is towed (body.shape: none)"},

@@ -32,7 +32,8 @@ void bt_case_window_follow(bt_case *c)
 /// First fault: its key, and why with remedy; NULL = none. The body reaches from x_min to x_max about its centroid.
 static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256])
 {
-    const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length, floe = c->ice.size;
+    const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length;
+    const double floe = bt_case_mean_size(c);
     if (c->domain.ends != BT_BOUND_MOVING) {
         // the resolved file has every key
         if (!ahead_given || fabs(ahead - bt_case_window_ahead(c)) <= 1e-9 * length) return NULL;
@@ -96,7 +97,8 @@ void bt_case_check_window(const bt_check *k, int n, const double *v)
     const bt_case *c = k->c;
     if (!bt_check_sound(k,
                         "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction "
-                        "tow.speed water.current_x body.x body.yaw body.shape ice.size"))
+                        "tow.speed water.current_x body.x body.yaw body.shape ice.size ice.size_min ice.size_max "
+                        "ice.size_exponent"))
         return;
     if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
     double x_min = 0, x_max = 0;

@@ -194,18 +194,15 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     return e;
 }
 
-// Mean diameter weighted with area, <d³>/<d²>. Power law: density ∝ d^(−a−1) on [lo, hi]; lognormal with mean m and
-// relative spread s: <d^k> = m^k (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: a gamma law (field/sizes.c), <d²> =
-// m² (1 + s²), <d³> = m³ (1 + s²) (1 + 2s²), so m (1 + 2s²). Truncation is left out.
+// Mean diameter weighted with area, <d³>/<d²>. Lognormal with mean m and relative spread s: <d^k> = m^k
+// (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: a gamma law (field/sizes.c), <d²> = m² (1 + s²), <d³> = m³ (1 + s²)
+// (1 + 2s²), so m (1 + 2s²). Truncation of these two is left out.
 static double weighted_size(const bt_case *c)
 {
-    const double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max,
-                 s2 = c->ice.size_spread * c->ice.size_spread;
+    const double s2 = c->ice.size_spread * c->ice.size_spread;
     if (c->ice.size_law == BT_SIZE_LOGNORMAL) return c->ice.size * (1 + s2) * (1 + s2);
     if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 2 * s2);
-    const double top = fabs(a - 3) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 3 - a) - bt_pow(lo, 3 - a)) / (3 - a);
-    const double bottom = fabs(a - 2) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 2 - a) - bt_pow(lo, 2 - a)) / (2 - a);
-    return top / bottom;
+    return bt_case_power_moment(c, 3) / bt_case_power_moment(c, 2);
 }
 
 void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)

@@ -119,22 +119,45 @@ double bt_sizes_mean_area(const bt_sizes *s)
     return BT_PI / 4 * s->mean * s->mean * (1 + s->spread * s->spread);
 }
 
-#define SIZE_OFF 0.05 // of the mean, from which on it is said
+#define SIZE_OFF 0.05   // of the mean, from which on it is said
+#define BELOW_OFF 0.01  // of the floes, likewise
+#define BELOW_SLACK 1e-2 // of size_min: a common factor near 1 brings the areas to the concentration
 
-void bt_field_size_warn(const bt_case *c, bt_idx n, double mean_size, bt_errors *warnings)
+/// Every floe is one that the size law drew, put into a cell.
+static bool as_drawn(const bt_case *c) { return !bt_case_reads_field(c) && c->lead.mode == BT_LEAD_NONE; }
+
+bt_field_sizes bt_field_sizes_of(const bt_case *c, const bt_field *f)
+{
+    const double limit = as_drawn(c) && c->ice.size_law != BT_SIZE_SINGLE ? (1 - BELOW_SLACK) * c->ice.size_min : 0;
+    bt_field_sizes s = {.n = f->n, .mean = bt_field_mean_size(f), .least = INFINITY};
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double d = sqrt(4 * f->area[i] / BT_PI);
+        s.below += d < limit;
+        s.least = bt_min(s.least, d);
+    }
+    return s;
+}
+
+void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors *warnings)
 {
     bt_sizes s;
     bt_errors refused = {0}; // such a case makes no ice
-    const bool made = !bt_case_reads_field(c) && c->n_floes == 0 && c->lead.mode == BT_LEAD_NONE && n > 0;
-    if (made && bt_sizes_init(&s, c, &refused) == BT_OK) {
+    const bt_idx n = found->n;
+    if (as_drawn(c) && n > 0 && bt_sizes_init(&s, c, &refused) == BT_OK) {
         const double mean = bt_sizes_mean(&s), second = bt_sizes_mean_area(&s) * 4 / BT_PI;
-        const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = mean_size - mean;
+        const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = found->mean - mean;
         if (fabs(off) > SIZE_OFF * mean && fabs(off) > 3 * scatter)
             bt_errors_add(warnings,
                           "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
                           "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
                           "count on the diameter that was made",
-                          (int)n, mean_size, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+                          (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+        if (found->below > BELOW_OFF * n)
+            bt_errors_add(warnings,
+                          "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "
+                          "get the room that larger ones leave them; narrow the range of sizes, or lower the "
+                          "concentration",
+                          (int)found->below, (int)n, 100.0 * found->below / n, found->least);
     }
     bt_errors_free(&refused);
 }

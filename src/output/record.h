@@ -153,6 +153,7 @@ typedef struct bt_run_totals {
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
+    bt_field_sizes sizes;        ///< of the field, without floes given by hand
     /// weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double mean_thickness, mean_radius;
     double concentration;        ///< as made

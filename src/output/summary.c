@@ -173,8 +173,7 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
 }
 
 /// What the bodies came to.
-static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
-                           bt_idx n_floes)
+static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
 {
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
         bt_errors_add(&s->warnings,
@@ -201,7 +200,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
                       "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
-    bt_field_size_warn(c, n_floes, t->mean_size, &s->warnings);
+    bt_field_size_warn(c, &t->sizes, &s->warnings);
     if (t->mean_thickness > 0) bt_ice_warn(c, t->mean_size, t->mean_thickness, &s->warnings);
     warn_of_events(s, t->events);
     bt_summary_window_warn(&s->warnings, t->window);
@@ -312,7 +311,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     bt_ice_warn_closed(c, t->ice_area, &s->warnings);
     if (t->undisturbed) bt_case_warn_lead(c, t->undisturbed->drift_x, t->undisturbed->drift_y, &s->warnings);
     warn_of_solver(s, h, c, t);
-    warn_of_bodies(s, h, c, t, n_floes);
+    warn_of_bodies(s, h, c, t);
 }
 
 double bt_summary_held_against(const bt_summary *s) { return s->window.met_no_ice ? NAN : s->ice.mean; }

@@ -97,6 +97,7 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
         .threads = threads,
         .dt = r->c->run.dt,
         .mean_size = r->roster.mean_size,
+        .sizes = bt_field_sizes_of(r->c, f),
         .mean_thickness = thickness,
         .mean_radius = radius,
         .concentration = lead->mode == BT_LEAD_NONE ? f->concentration : lead->concentration_before,

@@ -2,6 +2,7 @@
 """Where a run could go wrong without a word: bodies faster than the search for contacts, seams of periods, windows on
 another leg than the first, ranges of angles."""
 import json
+import re
 import subprocess
 import sys
 
@@ -298,3 +299,33 @@ def test_what_leaves_no_sizes_is_refused(tmp_path):
     ice = {"size_law": "lognormal", "size": 1, "size_spread": 1, "size_min": 0.9999999, "size_max": 1.0000001}
     done = call("field", write_case(tmp_path, changed(TOW, ice=ice)), "-o", tmp_path / "f.h5", timeout=30)
     assert done.returncode == CASE and "move the limits apart" in done.stderr
+
+
+def test_floes_below_the_least_size_are_counted(tmp_path):
+    """Cells of a dense power law leave small floes less room than they ask for. Floes given by hand change nothing of
+    it, and a resumed run says the same."""
+    ice = {"concentration": 0.9, "shape": "voronoi", "size_law": "power", "size_min": 0.5, "size_max": 8,
+           "size_exponent": 1.8}
+    case = changed(changed(TOW, ice__size=None), run__duration=1, domain={"length": 60, "width": 20}, ice=ice)
+    said = call("field", write_case(tmp_path, case), "-o", tmp_path / "field.h5").stdout
+    with h5py.File(tmp_path / "field.h5") as f:
+        size = np.sqrt(4 / np.pi * f["floes/area"][:])
+    below = int((size < 0.99 * 0.5).sum())
+    told = f"{below} of the {len(size)} floes, .* are smaller than ice.size_min, down to {size.min():.3g} m"
+    assert below > 0.02 * len(size) and re.search(told, said)
+    run(tmp_path, case, "--steps", "2")
+    assert call("resume", tmp_path / "out").returncode == DONE
+    assert re.search(told, str(json.loads((tmp_path / "out" / "summary.json").read_text())["warnings"]))
+    hand = changed(case, floes=[{"shape": "square", "length": 1, "x": 3, "y": 9, "thickness": 0.02}])
+    assert "smaller than ice.size_min" in call("field", write_case(tmp_path, hand), "-o", tmp_path / "hand.h5").stdout
+
+
+def test_room_of_a_moving_window_is_in_floes_of_the_size_law(tmp_path):
+    """With a power law ice.size, 1 m where it is not given, is the size of no floe."""
+    case = changed(changed(TOW, ice__size=None), body__x=10, domain={"length": 26, "width": 20, "ends": "moving"},
+                   ice={"concentration": 0.5, "size_law": "power", "size_min": 1, "size_max": 10,
+                        "size_exponent": 1.01})
+    assert call("check", write_case(tmp_path, changed(case, ice__size_max=1.5))).returncode == DONE
+    refused = call("check", write_case(tmp_path, case))
+    assert refused.returncode == CASE
+    assert re.search(r"domain.ahead: .* 4 floe sizes, 10.*m, are needed ahead of the body", refused.stderr)

@@ -229,6 +229,19 @@ def test_halves_at_the_180th_meridian_are_joined(tmp_path, width):
     assert abs((record["plane"]["centre"][0] - 180 - (width - 0.01) / 2 + 180) % 360 - 180) < 2e-6
 
 
+def test_the_180th_meridian_ends_no_map(tmp_path):
+    """Two floes that a file parts there are whole; two on the edge of a map elsewhere are cut by it."""
+    def square(x, y):
+        return [[x, y], [x + 0.01, y], [x + 0.01, y + 0.002], [x, y + 0.002], [x, y]]
+    def dropped_and_kept(at):
+        whole = [[[square(at - 0.01, y)]] + [[square(-180, y)]] * (at == 180) for y in (70, 70.01)]
+        places = [{"type": "MultiPolygon", "coordinates": parts} for parts in [*whole, [[square(at - 0.04, 70.005)]]]]
+        record = outlines(write(tmp_path / "map.geojson", places), "--cut", "drop")[1]
+        return counted(record).get("cut", 0), record["floes"]["floes"]
+    assert dropped_and_kept(at=180) == (0, 3)
+    assert dropped_and_kept(at=170) == (2, 1)
+
+
 def test_a_part_of_a_large_map(tmp_path):
     """What lies beyond the plane's reach is no hindrance when the box leaves it out."""
     map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS] + [places(regular(0, 0, 30e3), 60.0, 74.0)])
