@@ -379,7 +379,7 @@ def draw_exceedance(e, options, tails=None):
     step = max(1, -(-len(some) // MOST_LINES))
     figure, axes = plt.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
-    conversion, top, least = None, 0.0, np.inf
+    conversions, top, least = set(), 0.0, np.inf
     for colour, c in zip(CYCLE, some[::step]):
         hits = [h for h in map(e.impacts, c.finished) if h]
         fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
@@ -387,7 +387,8 @@ def draw_exceedance(e, options, tails=None):
         some_above = peaks > 0
         if not some_above.any():
             continue
-        conversion, top, least = hits[0][4], max(top, peaks[0]), min(least, peaks[some_above][-1])
+        conversions.update(h[4] for h in hits)
+        top, least = max(top, peaks[0]), min(least, peaks[some_above][-1])
         axes.plot(peaks[some_above],
                   rate[some_above],
                   color=colour,
@@ -405,12 +406,12 @@ def draw_exceedance(e, options, tails=None):
                       color=colour,
                       linewidth=1,
                       dashes=(4, 2))
-    if conversion is None:
+    if not conversions:
         plt.close(figure)
         return None
     style.logarithmic(axes.xaxis, axes.yaxis)
     axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
-    axes.set_xlabel(f"peak of a collision (N), {conversion}")
+    axes.set_xlabel(f"peak of a collision (N), {by(conversions)}")
     axes.set_ylabel("exceeded (per hour of tow)")
     axes.grid(True)
     notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
@@ -437,9 +438,24 @@ def draw_return_line(axes, x, label, colour, factor, beside):
             axes.plot(t, tail(f, t) / factor, color=colour, linewidth=1.4, dashes=dashes,
                       label=label if dashes == (None, None) else None)
     d = x["design"]
+    if "refused" in d:
+        return
     low, high = np.minimum(d["interval_95"], 1e3 * abs(d["value"])) / factor
     axes.plot([d["return_hours"] * beside] * 2, [low, high], color=colour, linewidth=1.4)
     axes.plot(d["return_hours"] * beside, d["value"] / factor, "D", color=colour, markersize=6)
+
+
+def by(conversions):
+    """Words for what a peak of a collision means, of the conditions of one picture."""
+    return next(iter(conversions)) if len(conversions) == 1 else "each condition by its own impact.conversion"
+
+
+def meaning(some):
+    """Words for what a value of a load is: its collisions and time scale, of the conditions of one picture."""
+    conversions = {x["conversion"] for x in some if x["conversion"]}
+    scales = sorted(x["time_scale_s"] for x in some)
+    over = f"{scales[0]:.3g}" if scales[-1] < 1.001 * scales[0] else f"{scales[0]:.3g} to {scales[-1]:.3g}"
+    return f"collisions as {by(conversions)}" if conversions else f"mean over {over} s"
 
 
 def draw_returns(e, conditions, name):
@@ -449,7 +465,9 @@ def draw_returns(e, conditions, name):
         return None
     step = max(1, -(-len(some) // MOST_LINES))
     shown, first = some[::step], some[0]["loads"][name]
-    values = [c["loads"][name]["design"]["value"] for c in shown]
+    designs = [d for d in (c["loads"][name]["design"] for c in shown) if "refused" not in d]
+    # where a tow is shorter than clusters are apart there is no design value
+    values = [d["value"] for d in designs] or [max(c["loads"][name]["over_threshold"]["maxima"]) for c in shown]
     factor, unit = style.scale([np.median(values)], first["units"])
     figure, axes = plt.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.09, right=0.66, top=0.86, bottom=0.14)
@@ -463,18 +481,20 @@ def draw_returns(e, conditions, name):
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.8 * floor, 4 * max(values) / factor)
     else:
-        ends = [v / factor for c in shown for v in c["loads"][name]["design"]["interval_95"] if np.isfinite(v)]
+        ends = [v / factor for d in designs for v in d["interval_95"] if np.isfinite(v)]
         top = min(2.5 * max(values) / factor, 1.05 * max([*ends, max(values) / factor]))
         axes.set_ylim(floor - 0.1 * (top - floor), top)
     axes.set_xlabel("return time (hours of tow)")
-    what = f"collisions as {first['conversion']}" if first["conversion"] else f"mean over {first['time_scale_s']:.3g} s"
-    axes.set_ylabel(f"{first['label']} ({unit}), {what}")
+    axes.set_ylabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")
     axes.grid(True)
-    d = first["design"]
+    tows = sorted({c["loads"][name]["design"]["tow_hours"] for c in shown})
+    hours = f"{tows[0]:.3g} h" if tows[-1] < 1.001 * tows[0] else f"{tows[0]:.3g} to {tows[-1]:.3g} h (Froude)"
     notes = ["dots: clusters of the fields together", "lines: tail fitted to them (GPD), dashed",
-             "beyond the hours simulated",
-             f"diamond, side by side: exceeded with {100 * d['probability']:g} %",
-             f"in a tow of {d['tow_hours']:.3g} h; bars: 95 %"]
+             "beyond the hours simulated"]
+    notes += [f"diamond, side by side: exceeded with {100 * first['design']['probability']:g} %",
+              f"in a tow of {hours}; bars: 95 %"] if designs else ["no design value: see the tables"]
+    if any(d["model"] == "GEV" for d in designs):
+        notes += ["beside a line: of block maxima (GEV)"]
     drawn = {c["label"] for c in some}
     lacking = [c["label"] for c in conditions if c["label"] not in drawn]
     if lacking:
@@ -509,9 +529,7 @@ def draw_above(e, conditions, name):
                           color=colour, alpha=0.15, linewidth=0)
     style.logarithmic(axes.yaxis)
     axes.set_ylim(50 * least, 100)
-    axes.set_xlabel(f"{first['label']} ({unit}), " +
-                    (f"collisions as {first['conversion']}" if first["conversion"] else
-                     f"mean over {first['time_scale_s']:.3g} s"))
+    axes.set_xlabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")
     axes.set_ylabel("share of the time above (%)")
     axes.grid(True)
     notes = ["from the median of a condition to the", "largest value simulated; band: 95 % over fields"]
@@ -521,19 +539,20 @@ def draw_above(e, conditions, name):
 
 
 def draw_map(e, first, second):
-    """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 %
-    interval over it."""
+    """Figure of two heat maps over two parameters of a grid: mean of the means of the conditions of a cell, which
+    differ in the other parameters, and half the 95 % interval over it."""
     conditions = [c for c in e.conditions() if len(c.finished)]
     xs, ys = (sorted({c.values[k] for c in conditions}) for k in (first, second))
-    mean, width, count = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
+    mean, width = (np.full((len(ys), len(xs)), np.nan) for _ in range(2))
+    most = 1
     for i, v in enumerate(ys):
         for j, u in enumerate(xs):
-            rows = [m for c in conditions if c.values[first] == u and c.values[second] == v for m in c.finished]
-            if rows:
-                sample = of(e, np.array(rows))
-                low, high = stat_mean.t_interval(sample)
-                mean[i, j], width[i, j], count[i, j] = sample.mean(), (high - low) / 2 / abs(
-                    sample.mean()) if sample.mean() else np.nan, len(rows)
+            cell = [dict(zip(e.seed[c.finished].tolist(), of(e, c.finished))) for c in conditions
+                    if c.values[first] == u and c.values[second] == v]
+            if cell:
+                mean[i, j], low, high = stat_mean.mean_of_conditions(cell)
+                width[i, j] = (high - low) / 2 / abs(mean[i, j]) if mean[i, j] else np.nan
+                most = max(most, len(cell))
     factor, unit = style.scale([np.nanmedian(mean)], "N")
     figure, axes = plt.subplots(1, 2, figsize=(12, 2.6 + 0.62 * len(ys)))
     height = figure.get_size_inches()[1]
@@ -563,7 +582,9 @@ def draw_map(e, first, second):
         ax.set_xlabel(axis_label(e, first))
         ax.set_title(label, fontsize=10.5)
     axes[0].set_ylabel(axis_label(e, second))
-    headline(figure, e, f"over {short_key(first)} and {short_key(second)}")
+    others = [short_key(k) for k in e.parameters if k not in (first, second)]
+    headline(figure, e, f"over {short_key(first)} and {short_key(second)}" +
+             (f", mean of {most} conditions of {' and '.join(others)}" if most > 1 else ""))
     return figure
 
 

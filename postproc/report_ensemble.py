@@ -101,7 +101,8 @@ MARGIN = 1.05  # times the largest value simulated: what is less has little room
 #: marks behind a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
-    "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few.",
+    "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few, or farther apart "
+         "than the return time.",
     "‡": "less than 5 % above the largest simulated: little margin for so long a return time."
 }
 

@@ -91,6 +91,25 @@ def t_interval(x, level=LEVEL):
     return np.mean(x) - half, np.mean(x) + half
 
 
+def mean_of_conditions(conditions, level=LEVEL):
+    """(mean, low, high) of the mean of the means of several conditions; NaNs for the bounds where one has fewer than two
+    fields. conditions: [{field: value}]. Values of one field move together, whatever conditions they belong to: with m
+    conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the variance is the
+    sum of d^2 n / (n - 1). With one condition that is t_interval."""
+    counts, moved = [len(c) for c in conditions], {}
+    mean = np.mean([np.mean(list(c.values())) for c in conditions])
+    if min(counts) < 2:
+        return mean, np.nan, np.nan
+    for c, n in zip(conditions, counts):
+        own = np.mean(list(c.values()))
+        for field, x in c.items():
+            moved[field] = moved.get(field, 0.0) + (x - own) / (n * len(counts)) * np.sqrt(n / (n - 1))
+    apart = len(moved) == sum(counts)  # no two conditions share a field
+    free = sum(counts) - len(counts) if apart else min(counts) - 1
+    half = scipy.stats.t.ppf(0.5 + level / 2, free) * np.sqrt(sum(d * d for d in moved.values()))
+    return mean, mean - half, mean + half
+
+
 def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):
     """(low, high) of the mean by the studentised bootstrap: m - q_high se, m - q_low se with q of (m* - m) / se*. NaN
     for fewer than LEAST_BOOTSTRAP."""

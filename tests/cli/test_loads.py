@@ -763,4 +763,10 @@ def test_the_picture_of_return_levels(statement):
     assert dots.get_ydata()[0] * 1e6 == pytest.approx(f["maxima"][0])
     level = f["levels"][0]
     assert plot_ensemble.tail(f, np.array([level["hours"]]))[0] == pytest.approx(level["level"])
+    # where a tow is shorter than clusters are apart
+    for c in s["conditions"]:
+        c["loads"]["tow_force"]["design"] = {"refused": "no level", "return_hours": 0.01, "tow_hours": 0.001}
+    figure = plot_ensemble.draw_returns(e, s["conditions"], "tow_force")
+    assert "no design value" in str([t.get_text() for t in figure.texts])
+    assert not [line for line in figure.axes[0].lines if line.get_marker() == "D"]
     matplotlib.pyplot.close("all")

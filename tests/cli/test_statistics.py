@@ -468,6 +468,37 @@ def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
     matplotlib.pyplot.close("all")
 
 
+def test_a_map_says_what_it_is_the_mean_of(tmp_path):
+    """A third parameter: every cell is a mean over its conditions, of as many tows as they have, on common fields."""
+    some = [made_up.member(np.full(30, 100 * a + 10 * v + t + r), {
+        "ice.concentration": a, "tow.speed": v, "ice.thickness": t}, c)
+        for c, (a, v, t) in enumerate((a, v, t) for a in (0.2, 0.5) for v in (0.1, 0.2) for t in (1.0, 2.0, 3.0))
+        for r in range(4)]
+    e = Ensemble(made_up.write(tmp_path / "a", some))
+    e.seed[:] = np.arange(len(some)) % 4
+    figure = plot_ensemble.draw_map(e, "ice.concentration", "tow.speed")
+    assert any("mean of 3 conditions of thickness" in t.get_text() for t in figure.texts)
+    shown = [t.get_text() for ax in figure.axes[:2] for t in ax.texts]
+    half = stats.t.ppf(0.975, 3) * np.std(range(4), ddof=1) / 2
+    means = [100 * a + 10 * v + 2 + 1.5 for v in (0.1, 0.2) for a in (0.2, 0.5)]
+    assert shown[:4] == [f"{m:.3g}" for m in means] and shown[4:] == [f"{100 * half / m:.0f} %" for m in means]
+    matplotlib.pyplot.close("all")
+
+
+def test_pictures_name_every_conversion(tmp_path):
+    """The axis has one where conditions have one, and none of them where they differ."""
+    peaks = np.linspace(0.5, 29, 40), np.linspace(1, 5, 40)
+    def label(second):
+        some = [made_up.member(np.ones(30), {"ice.concentration": a}, c, peaks=peaks, conversion=how)
+                for c, (a, how) in enumerate([(0.2, "half-sine of 0.1 s"), (0.5, second)]) for _ in range(2)]
+        e = Ensemble(made_up.write(tmp_path / second, some))
+        tails = [{"refused": "few"}] * 2
+        return plot_ensemble.draw_exceedance(e, None, tails).axes[0].get_xlabel()
+    assert label("half-sine of 0.1 s") == "peak of a collision (N), half-sine of 0.1 s"
+    assert label("crushing") == "peak of a collision (N), each condition by its own impact.conversion"
+    matplotlib.pyplot.close("all")
+
+
 # ---- with the program
 
 def flat_names(path):

@@ -61,6 +61,23 @@ def test_95_percent_of_the_intervals_between_fields_hold_the_mean(n):
     assert 0.95 - 0.012 <= np.mean((median[:, 0] <= 3) & (median[:, 1] >= 3)) <= 1
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_95_percent_of_the_intervals_over_conditions_hold_the_mean(shared):
+    """Conditions of means far apart, on the same fields or on fields of their own; of one condition it is t_interval.
+    Red when all members are taken for one sample: that holds the mean always, by intervals too long, or too seldom."""
+    rng, levels, n, hit = np.random.default_rng(11), (0.0, 10.0, 20.0), 6, []
+    for _ in range(TRIALS):
+        field = rng.normal(0, 1, (1 if shared else len(levels), n))
+        x = np.array(levels)[:, None] + field + rng.normal(0, 0.3, (len(levels), n))
+        cells = [{(0 if shared else k, r): v for r, v in enumerate(row)} for k, row in enumerate(x)]
+        mean, low, high = stat_mean.mean_of_conditions(cells)
+        hit.append(low <= 10 <= high)
+    assert mean == pytest.approx(x.mean()) and 0.93 <= np.mean(hit) <= 0.97
+    one = stat_mean.mean_of_conditions(cells[:1])
+    assert one[1:] == pytest.approx(stat_mean.t_interval(x[0]), rel=1e-12) and one[0] == pytest.approx(x[0].mean())
+    assert np.isnan(stat_mean.mean_of_conditions([{1: 2.0}, {1: 3.0, 2: 4.0}])[1:]).all()
+
+
 def test_the_studentised_bootstrap_follows_skewness():
     x = np.random.default_rng(9).lognormal(0, 1, (600, 20))
     truth, rng = np.exp(0.5), np.random.default_rng(10)
