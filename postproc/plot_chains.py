@@ -87,9 +87,26 @@ def outlines(run, c):
     """Floes and bodies at the end of the step: two lists of [n, 2] m."""
     pose = c.pose.copy()
     pose[:run.n_floes, :2] = run.wrap(pose[:run.n_floes, :2])
+    for k, b in enumerate(run.bodies):
+        if b.towed:
+            pose[run.n_floes + k, :2] = run.wrap(pose[run.n_floes + k:run.n_floes + k + 1, :2])[0]
     floes = [place(run.vertices[a:b], p) for a, b, p in zip(run.offsets[:-1], run.offsets[1:], pose)]
     bodies = [place(b.vertices, p) for b, p in zip(run.bodies, pose[run.n_floes:])]
     return floes, bodies
+
+
+def with_images(run, shapes):
+    """(copies of shapes [n, 2] m, the number of each) that reach into the domain: what crosses a periodic end comes in at
+    the other."""
+    (x0, x1, y0, y1), (px, py) = run.box, run.period
+    out, which = [], []
+    for shift in ((i * px, j * py) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))):
+        for k, shape in enumerate(shapes):
+            low, high = (np.asarray(shape) + shift).min(axis=0), (np.asarray(shape) + shift).max(axis=0)
+            if not any(shift) or (high >= (x0, y0)).all() and (low <= (x1, y1)).all():
+                out.append(np.asarray(shape) + shift)
+                which.append(k)
+    return out, np.array(which, dtype=int)
 
 
 def view(run, lines, bodies, whole):
@@ -121,8 +138,10 @@ def draw(run, c, whole=False):
     axes = figure.add_axes((0.7 / width, 0.6 / height, (width - 2.1) / width, (height - 1.5) / height))
     axes.set_facecolor(style.WATER)
     axes.add_collection(
-        PolyCollection([turn(p) for p in floes], facecolor="#dfe9ef", edgecolor="#8fa3b3", linewidth=0.5))
-    for body, shape in zip(run.bodies, bodies):
+        PolyCollection([turn(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef", edgecolor="#8fa3b3",
+                       linewidth=0.5))
+    for shape, k in zip(*with_images(run, bodies)):
+        body = run.bodies[k]
         colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
         axes.add_collection(
             PolyCollection([turn(shape)],
@@ -132,6 +151,8 @@ def draw(run, c, whole=False):
                            zorder=2))
     top = force.max(initial=0.0)
     if top > 0:
+        lines, which = with_images(run, lines)
+        lines, force = np.array(lines), force[which]
         order = np.argsort(force)
         lines, force = lines[order], force[order]
         least = top * 10 ** -DECADES

@@ -83,9 +83,14 @@ class Picture:
         return self._kept[kind]
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write it to a file that ends in .png, .pdf or .svg, and return its path."""
+        """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as it is shown;
+        the others are drawn from the folder as it is now."""
         path = Path(file)
-        self._draw(path)
+        kind = path.suffix.lstrip(".")
+        if kind in self._kept and path.parent.is_dir():
+            path.write_bytes(self._kept[kind])
+        else:
+            self._draw(path)
         return path
 
     def _repr_png_(self) -> bytes:

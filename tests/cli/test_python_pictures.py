@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
 import json
+import shutil
 import subprocess
 import sys
 
@@ -49,6 +50,16 @@ def test_a_picture_is_that_of_the_script(towed, tmp_path, name, words, options):
     drawn_by(f"plot_{name}.py", towed, "-o", tmp_path / "theirs.png", *words)
     assert picture._repr_png_() == (tmp_path / "theirs.png").read_bytes()
     assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
+
+
+def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
+    """Whatever has become of the folder since."""
+    shutil.copytree(towed, tmp_path / "out")
+    picture = bergtow.plot_force(tmp_path / "out", max=50)
+    shutil.rmtree(tmp_path / "out")
+    assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
+    with pytest.raises(bergtow.BergtowError, match="out: no such"):
+        picture.save(tmp_path / "kept.pdf")
 
 
 @pytest.mark.slow

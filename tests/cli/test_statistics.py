@@ -11,6 +11,7 @@ import h5py
 import matplotlib
 import numpy as np
 import pytest
+import shapely.geometry as shapely
 from scipy import stats
 
 import made_up_ensemble as made_up
@@ -548,6 +549,23 @@ def test_a_small_ensemble_of_the_program(tmp_path):
             if k in theirs} == {k: theirs[k]
                                 for k in ours
                                 if k in theirs} and set(ours) <= set(theirs), sorted(set(ours) - set(theirs))
+
+
+def test_force_chains_go_over_the_seam(tmp_path):
+    """Images fill a periodic domain: the area of all floes and of the body lies within it, after more than a lap."""
+    case = changed(TOW, domain={"length": 15, "width": 8, "ends": "periodic", "sides": "periodic"}, run__duration=25,
+                   ice__concentration=0.6, tow={"speed": 0.7, "ramp": 2}, body__draft=0.05)
+    run(tmp_path, case, "--dump-contacts", f"220:{tmp_path / 'c.h5'}")
+    c = plot_chains.read(tmp_path / "c.h5")
+    with Run(tmp_path / "out") as picture:
+        x0, x1, y0, y1 = picture.box
+        floes, bodies = plot_chains.outlines(picture, c)
+        domain = shapely.box(x0, y0, x1, y1)
+        for shapes in (floes, bodies):
+            images, which = plot_chains.with_images(picture, shapes)
+            inside = np.bincount(which, [shapely.Polygon(p).intersection(domain).area for p in images])
+            np.testing.assert_allclose(inside, [shapely.Polygon(p).area for p in shapes], rtol=1e-6)
+        assert len(plot_chains.with_images(picture, floes)[0]) > len(floes) + 10
 
 
 def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
