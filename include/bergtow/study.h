@@ -127,7 +127,8 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
 /// Release what a member holds.
 void bt_member_free(bt_member *m);
 
-/// The case of a member: the base with its overrides; messages name where in the study these stand. Errors:
+/// The case of a member: the base with its overrides, and named by the title of the study, its condition and its field
+/// unless the study sets run.title; messages name where in the study these stand. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err);
 

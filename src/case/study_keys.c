@@ -13,7 +13,7 @@ static const char *const fields[] = {"own", "common", NULL};
     {.name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, .doc = doc_}
 
 const bt_key bt_study_keys[] = {
-    ROW("title", TEXT, "none", "one line for the reports"),
+    ROW("title", TEXT, "none", "one line for the reports; a member has it with its condition and its field"),
     ROW("report", MAP, "none",
         "client, project, author and revision for the title block of the report: {client: ..., revision: B}"),
     ROW("base", TEXT, NULL, "the case that is varied; relative to the folder of the study file"),

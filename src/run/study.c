@@ -93,9 +93,28 @@ void bt_member_free(bt_member *m)
     *m = (bt_member){0};
 }
 
+/// A title of the study names its members, which that of the base, of one condition, would name wrongly.
+static void name_member(const bt_study *s, const bt_member *m, bt_case *c)
+{
+    for (int i = 0; i < m->n_set; i++)
+        if (!strncmp(m->set[i], "run.title=", 10)) return;
+    if (!s->title || !*s->title) return;
+    char text[1024];
+    size_t n = (size_t)snprintf(text, sizeof text, "%s", s->title);
+    for (int p = 0; p < s->n_parameters && n < sizeof text; p++) {
+        const char *key = s->parameter[p].key >= 0 ? s->parameter[p].name : "";
+        n += (size_t)snprintf(text + n, sizeof text - n, ", %s%s%s", key, *key ? " " : "", m->value[p]);
+    }
+    if (n >= sizeof text) return;
+    free(c->run.title);
+    c->run.title = bt_text_of("%s, field %" PRId64, text, m->repeat + 1);
+}
+
 bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err)
 {
-    return bt_case_read_placed(c, s->base, (const char *const *)m->set, m->at, m->n_set, err);
+    const bt_status status = bt_case_read_placed(c, s->base, (const char *const *)m->set, m->at, m->n_set, err);
+    if (status == BT_OK) name_member(s, m, c);
+    return status;
 }
 
 bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err)

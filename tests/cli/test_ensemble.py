@@ -42,6 +42,22 @@ def quiet(tmp_path_factory):
     return folder, result
 
 
+def test_a_study_names_its_members(quiet, tmp_path):
+    """The base's title is that of one condition. What the study sets is kept, and a study without a title says no more
+    than the base."""
+    def title(folder, name="c004-r002"):
+        return json.loads((folder / "all/members" / name / "summary.json").read_text())["title"]
+    assert title(quiet[0]) == "small, ice.concentration 0.5, tow.speed 0.2, field 2"
+    base = changed(TOW, run={"dt": 0.1, "duration": 1, "title": "of the base"})
+    one = {"base": "base.yml", "parameters": {"ice.concentration": [0.2, 0.5]}}
+    wanted = {"of the base": {}, "set": {"title": "s", "set": {"run.title": "set"}},
+              "s: #1, ice.concentration 0.5, field 1": {"title": "s: #1"}}
+    for k, (text, more) in enumerate(wanted.items()):
+        (tmp_path / str(k)).mkdir()
+        assert ensemble(prepare(tmp_path / str(k), one | more, base)).returncode == DONE
+        assert title(tmp_path / str(k), "c002-r001") == text
+
+
 def test_a_row_for_each_member(quiet):
     folder, result = quiet
     with h5py.File(folder / "all/ensemble.h5") as f:
