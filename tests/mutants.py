@@ -70,7 +70,8 @@ MUTANTS = {
         ("deepest = bt_max(deepest, -bt_apart_of(", "deepest = bt_max(deepest, +bt_apart_of(", "places far from all"),
     ]),
     "src/step/edit.c": ([EDGES + "a_place_is_taken_on_all_ranks_or_on_none",
-                         PUT + "bodies_are_changed_by_hand_within_limits", "cli/test_python_stepping.py"], [
+                         PUT + "bodies_are_changed_by_hand_within_limits",
+                         PUT + "a_body_that_drifts_is_recorded_where_it_was_put", "cli/test_python_stepping.py"], [
         ("bt_domain_maxima(w, &found, 1);", "", "ranks disagree on a place"),
         ("if (b->gid[j] == gid ||", "if (", "a body in its own way"),
         ("turned[2 * k + 1] = s * v[0] + c * v[1];", "turned[2 * k + 1] = v[1];", "the outline is not turned"),
@@ -296,10 +297,8 @@ MUTANTS = {
         ("bt_max(t->gaps[j].gap[i], 0) / w->par.dt;", "t->gaps[j].gap[i] / w->par.dt;", "place of an overlap"),
         ("if (t->laws.n_memory > before)", "if (0)", "records are not sorted"),
         ("bt_domain_maxima(w, most, BT_LAWS);", "", "deepest of one rank"),
-        ("if (bt_laws[law]->counts_contacts) totals->most = bt_max(totals->most, most[law]);", ";",
-         "crushed depth is not reported"),
-        ("if (law->counts_contacts && ts->cell[k].n_contacts > 0) continue;", "",
-         "crushed ice of contacts counts twice"),
+        ("most[r->law] = bt_max(most[r->law], bt_laws[r->law]->count(w, r, sums_of(totals, r->law)));",
+         "bt_laws[r->law]->count(w, r, sums_of(totals, r->law));", "crushed depth is not reported"),
         ("if (bt_laws[law]->rises && bt_law_on(p, law)) return true;", "", "contacts with rising bounds in batches"),
     ]),
     "src/contact/manifold.c": (["physics/test_crush", "physics/test_rafting", "scenes:rafting,rafting_press"], [
@@ -347,7 +346,7 @@ MUTANTS = {
         ("-bt_contacts_normal_work(w, &t->contacts[j], i));", "bt_contacts_normal_work(w, &t->contacts[j], i));",
          "sign"),
         ("deepest = bt_max(deepest, depth_of(s));", "deepest = depth_of(s);", "the last of the parts, not the deepest"),
-        ("if (l->record[BT_LAW_RAFTING] >= 0) return 0;", "",
+        ("if (l->record[BT_LAW_RAFTING] >= 0) return;", "",
          "rafted and crushed"),
         ("bt_max(dt * c.approach - c.gap, LEAST_WAY", "bt_max(dt * c.approach, LEAST_WAY", "way without the gap"),
     ]),

@@ -23,7 +23,7 @@ static const bt_law_number numbers[] = {
     [CRUSHED_WORK] = {"crushed_work", "J", "work taken by contact points that crush", BT_KEEP_SUM,
                       .key = "crushed_work_j"},
     [CRUSHED_DEPTH] = {"crushed_depth", "m",
-                       "deepest crush of a pair of bodies in contact, or at rest beside each other", BT_KEEP_MAX,
+                       "deepest crush of a pair of bodies that touch, or touched and are still near", BT_KEEP_MAX,
                        .largest = true, .key = "max_crushed_depth_m"},
 };
 
@@ -182,16 +182,16 @@ static void keep_depth(bt_memory *r, uint32_t feature, double depth, bool unseen
     r->n_points++;
 }
 
-static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
+static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
     (void)number;
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
     const bt_idx at = l->record[BT_LAW_CRUSHING];
-    if (l->record[BT_LAW_RAFTING] >= 0) return 0;
+    if (l->record[BT_LAW_RAFTING] >= 0) return;
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
-    if (deepest == 0) return at >= 0 ? depth_of(&t->laws.memory[at]) : 0;
+    if (deepest == 0) return;
     const bt_pair *p = &t->search.pairs[t->contacts[j].pair];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
     // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
@@ -203,7 +203,6 @@ static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     }
     for (int i = 0; i < u->n; i++) keep_depth(&r, p->feature[i], l->depth[i], false);
     bt_law_put(t, at, &r);
-    return depth_of(&r);
 }
 
 const bt_law bt_crush_law = {.name = "crushing",
@@ -212,7 +211,6 @@ const bt_law bt_crush_law = {.name = "crushing",
                              .setup = setup,
                              .on = on,
                              .rises = true,
-                             .counts_contacts = true,
                              .numbers = numbers,
                              .n_numbers = sizeof numbers / sizeof *numbers,
                              .totals = totals,

@@ -155,19 +155,15 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
     (void)context;
     bt_cell *t = &w->cells->cell[k];
     const bt_idx before = t->laws.n_memory;
-    double most[BT_LAWS] = {0};
     for (bt_idx j = 0; j < t->n_contacts; j++) {
         grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
-            if (bt_law_on(&w->par, law))
-                most[law] = bt_max(most[law], bt_laws[law]->remember(w, t, j, sums_of(totals, law)));
+            if (bt_law_on(&w->par, law)) bt_laws[law]->remember(w, t, j, sums_of(totals, law));
         for (int law = BT_LAWS; law < BT_ALL_LAWS; law++)
             if (bt_law_on(&w->par, law)) bt_added_remember(w, law, t, j, totals);
     }
     if (t->laws.n_memory > before)
         qsort(t->laws.memory, (size_t)t->laws.n_memory, sizeof *t->laws.memory, bt_memory_by_names);
-    for (int law = 0; law < BT_LAWS; law++)
-        if (bt_laws[law]->counts_contacts) totals->most = bt_max(totals->most, most[law]);
 }
 
 /// All records of this rank, also of pairs that have come to rest against each other and have no contacts.
@@ -181,9 +177,7 @@ static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *to
                 bt_added_count(w, r, totals);
                 continue;
             }
-            const bt_law *law = bt_laws[r->law];
-            if (law->counts_contacts && ts->cell[k].n_contacts > 0) continue;
-            most[r->law] = bt_max(most[r->law], law->count(w, r, sums_of(totals, r->law)));
+            most[r->law] = bt_max(most[r->law], bt_laws[r->law]->count(w, r, sums_of(totals, r->law)));
         }
 }
 
@@ -193,8 +187,6 @@ void bt_laws_grow(bt_world *w)
     double most[BT_LAWS] = {0};
     if (bt_laws_on(&w->par)) {
         bt_phases_any_order(w, grow_cell, NULL, &t);
-        for (int law = 0; law < BT_LAWS; law++)
-            if (bt_laws[law]->counts_contacts) most[law] = t.most;
         count_records(w, most, &t);
         bt_domain_reduce(w, &t);
         bt_domain_maxima(w, most, BT_LAWS);

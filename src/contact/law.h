@@ -52,7 +52,7 @@ enum { BT_MAX_LAW_TOTALS = 16 };
 typedef struct bt_law_number {
     const char *name, *units, *description;
     bt_keep keep;     ///< how steps merge
-    bool largest;     ///< what `remember` and `count` return, one number of a law at most; else an exact sum
+    bool largest;     ///< what `count` returns, one number of a law at most; else an exact sum
     const char *key;  ///< of the total in summary.json that stands for it
 } bt_law_number;
 
@@ -97,9 +97,6 @@ typedef struct bt_law {
     void (*setup)(const bt_case *c, double own[BT_MAX_CONTACT_OWN]);
     bool (*on)(const double *own);
     bool rises; ///< some bounds have a rising part: contacts with them are not swept in batches (src/solve/batch.h)
-    /// `remember` adds a contact's record to the numbers, so that `count` is called in cells without contacts alone; of
-    /// one law at most, as a pass carries one maximum
-    bool counts_contacts;
     const bt_law_number *numbers; ///< [n_numbers]
     int n_numbers;
     const bt_law_total *totals;   ///< [n_totals], in the order of the summary
@@ -119,9 +116,9 @@ typedef struct bt_law {
     /// It is, and approaches: limits[j].grown[i] has been set.
     /// number, here and below: [n_numbers] the sums of the law's numbers.
     void (*give_way)(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number);
-    /// After the solve: into the records of the cell. Returns what the law wants the largest of.
-    double (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number);
-    /// A record into the sums; the same largest. Of all records, also where nothing moves.
+    /// After the solve: into the records of the cell.
+    void (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number);
+    /// A record into the sums; returns what the law wants the largest of. Of all records, also where nothing moves.
     double (*count)(const bt_world *w, const bt_memory *r, bt_sum *number);
     // texts in new memory, or NULL for nothing to say
     /// A line of `bergtow check`: what the law means for floes of this thickness and mean size, m.

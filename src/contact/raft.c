@@ -226,7 +226,7 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
-static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
+static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
@@ -235,15 +235,14 @@ static double remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
         t->laws.memory[at].value[2] = u->ln[0];
         t->laws.memory[at].value[3] = u->lt;
         bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(w, u));
-        return 0;
+        return;
     }
     bool begins = false;
     for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && gives_way(u, l, i));
-    if (!begins || at >= 0) return 0;
+    if (!begins || at >= 0) return;
     bt_memory r = bt_law_names(w, &t->search.pairs[t->contacts[j].pair], BT_LAW_RAFTING);
     r.n_points = 2;
     bt_law_put(t, -1, &r);
-    return 0;
 }
 
 const bt_law bt_raft_law = {.name = "rafting",

@@ -199,9 +199,6 @@ static void numbers_of_the_laws_have_their_places(void **state)
 {
     (void)state;
     assert_true(bt_law_first_number(BT_LAWS) <= BT_MAX_LAW_NUMBERS && bt_law_first_total(BT_LAWS) <= BT_MAX_LAW_TOTALS);
-    int with_largest = 0; // a pass carries one
-    for (int law = 0; law < BT_LAWS; law++) with_largest += bt_laws[law]->counts_contacts;
-    assert_true(with_largest <= 1);
     for (int law = 0; law < BT_LAWS; law++) {
         const bt_law *l = bt_laws[law];
         bool summed[BT_MAX_LAW_NUMBERS] = {false};
