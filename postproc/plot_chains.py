@@ -96,8 +96,8 @@ def outlines(run, c):
 
 
 def with_images(run, shapes):
-    """(copies of shapes [n, 2] m, the number of each) that reach into the domain: what crosses a periodic end comes in at
-    the other."""
+    """(copies of shapes [n, 2] m, the number of each) that reach into the domain: what crosses a periodic end comes in
+    at the other."""
     (x0, x1, y0, y1), (px, py) = run.box, run.period
     out, which = [], []
     for shift in ((i * px, j * py) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))):

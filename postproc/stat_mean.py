@@ -92,10 +92,10 @@ def t_interval(x, level=LEVEL):
 
 
 def mean_of_conditions(conditions, level=LEVEL):
-    """(mean, low, high) of the mean of the means of several conditions; NaNs for the bounds where one has fewer than two
-    fields. conditions: [{field: value}]. Values of one field move together, whatever conditions they belong to: with m
-    conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the variance is the
-    sum of d^2 n / (n - 1). With one condition that is t_interval."""
+    """(mean, low, high) of the mean of the means of several conditions; NaNs for the bounds where one has fewer than
+    two fields. conditions: [{field: value}]. Values of one field move together, whatever conditions they belong to:
+    with m conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the variance is
+    the sum of d^2 n / (n - 1). With one condition that is t_interval."""
     counts, moved = [len(c) for c in conditions], {}
     mean = np.mean([np.mean(list(c.values())) for c in conditions])
     if min(counts) < 2:

@@ -83,8 +83,8 @@ class Picture:
         return self._kept[kind]
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as it is shown;
-        the others are drawn from the folder as it is now."""
+        """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as shown; the
+        others are drawn from the folder as it is now."""
         path = Path(file)
         kind = path.suffix.lstrip(".")
         if kind in self._kept and path.parent.is_dir():

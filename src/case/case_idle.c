@@ -63,8 +63,8 @@ static void list(const bt_case *c, idle out[RULES])
         {c->body.shape == BT_BODY_POLYGON, "body.length body.width", "body.shape",
          "on the waterline of body.vertices (body.shape: polygon)"},
         {c->body.shape == BT_BODY_ABSENT,
-         "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail "
-         "body.density body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
+         "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail body.density "
+         "body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
          "body.drag.water_skin body.drag.air_form body.drag.air_skin",
          "body.shape", "without a towed body (body.shape: none)"},
         {c->body.shape == BT_BODY_ABSENT, "tow.ramp", "body.shape", "without a body that is towed (body.shape: none)"},
