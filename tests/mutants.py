@@ -416,7 +416,7 @@ MUTANTS = {
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
         ("b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;", "", "shifted floes are taken for quiet"),
-        ("p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);", "p->x += dx;",
+        ("p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->lap[i]);", "p->x += dx;",
          "floes leave the periodic domain"),
         ("w->tow->travel_y += dy;", "", "way of the body across"),
         ("b->radius[i] * fabs(turn)", "0 * fabs(turn)", "turning adds no path"),
@@ -445,7 +445,7 @@ MUTANTS = {
         ("bt_domain_maxima(w, blocked, (int)n);", "", "ranks disagree on free places"),
         ("more = more || (blocked[k] > 0 && !list[k].stays);", "", "no second look at what stays"),
         ("if (moved[p->a] || moved[p->b]) p->n_points = 0;", ";", "old impulses at a new place"),
-        ("h->lap = turns + h->copy;", "h->lap = h->copy;", "laps"),
+        ("b->lap[i] = turns + h->copy;", "b->lap[i] = h->copy;", "laps"),
         ("b->vel[i] = b->vel_start[i] = b->vel_free[i] = w->undisturbed->vel;", "b->vel[i] = w->undisturbed->vel;",
          "free velocity of the old place"),
         ("b->disturbed[i] = 1;", "", "a floe that was put is taken for quiet"),

@@ -257,7 +257,7 @@ static void **array_of(bt_bodies *b, int k) { return (void **)((char *)b + bt_bo
 static void permute(bt_bodies *b, const sort_key *key)
 {
     const size_t n = (size_t)b->n;
-    for (int k = 0; k < bt_n_body_fields; k++) {
+    for (int k = 0; k < bt_bodies_n_fields(b); k++) {
         const size_t size = bt_body_fields[k].size;
         char *old = *array_of(b, k), *new = bt_alloc_aligned((size_t)b->cap, size);
         for (size_t i = 0; i < n; i++) memcpy(new + i * size, old + (size_t)key[i].from * size, size);

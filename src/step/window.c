@@ -47,12 +47,13 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
     v->stride = bt_min(BT_WINDOW_STRIDE * w->par.size, bt_min(0.25 * zone, length / 16));
     v->start = v->rear = body_at(w) + ahead - length;
     v->most = body_at(w);
+    bt_bodies_make_homes(b);
     for (bt_idx i = 0; i < b->n; i++) {
         const double x = b->pose[i].x;
         bt_home *h = &b->home[i];
         *h = (bt_home){.x = x, .y = b->pose[i].y, .yaw = b->pose[i].yaw};
         if (b->gid[i] >= n_floes) continue;
-        h->copy = h->lap = bt_window_lap(w, x);
+        h->copy = b->lap[i] = bt_window_lap(w, x);
     }
 }
 
@@ -77,7 +78,7 @@ static double home_at(const bt_world *w, bt_idx i)
 }
 static double floe_at(const bt_world *w, bt_idx i)
 {
-    const double x = w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length;
+    const double x = w->bodies.pose[i].x + w->bodies.lap[i] * w->window->length;
     return w->window->sign * (x - w->undisturbed->drift_x);
 }
 
@@ -251,7 +252,7 @@ static void put(bt_world *w, bt_idx i)
     int32_t turns = 0;
     b->pose[i] = place_of(w, i, &turns);
     h->copy += (int32_t)v->sign;
-    h->lap = turns + h->copy;
+    b->lap[i] = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = w->undisturbed->vel;
     b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
@@ -306,7 +307,7 @@ static void let_go(bt_world *w)
             if (own) bt_sum_add(&t.sum[MISSED], 1);
         }
         if (floe_at(w, i) < v->rear - v->zone) {
-            b->home[i].lap += (int32_t)v->sign;
+            b->lap[i] += (int32_t)v->sign;
             if (own) bt_sum_add(&t.sum[KEPT], 1);
         }
         if (own && floe_at(w, i) < v->rear) bt_sum_add(&t.sum[WAITING], 1);
