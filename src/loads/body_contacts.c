@@ -51,12 +51,12 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
-                                bt_idx towed)
+static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, bt_idx j,
+                              bt_idx towed)
 {
     const bt_bodies *b = &w->bodies;
+    const bt_contact *u = &cell->contacts[j];
     const bool is_b = u->b == towed;
-    const bt_pair *pair = &cell->search.pairs[u->pair];
     const bt_idx other = is_b ? u->a : u->b;
     const double sign = is_b ? 1 : -1, total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};
     const bt_inv ia = bare(b, u->a), ib = bare(b, u->b);
@@ -90,7 +90,8 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, pair->part, pair->feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner = corner_of(b, u, cell->search.pairs[u->pair].part,
+                            cell->gaps[j].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];
@@ -114,7 +115,7 @@ static void add_cell(const bt_world *w, const bt_impacts *m, bt_idx k, contact_r
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-        const bt_body_contact t = row_of(w, m, cell, u, towed);
+        const bt_body_contact t = row_of(w, m, cell, j, towed);
         add(to, &t);
     }
 }

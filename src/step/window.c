@@ -233,7 +233,7 @@ static void forget_contacts(bt_world *w, const uint8_t *moved)
         bt_cell *cell = &t->cell[k];
         for (bt_idx j = 0; j < cell->search.n_pairs; j++) {
             bt_pair *p = &cell->search.pairs[j];
-            if (moved[p->a] || moved[p->b]) p->n_points = 0;
+            if (moved[p->a] || moved[p->b]) p->contact = -1;
         }
         bt_idx kept = 0;
         for (bt_idx j = 0; j < cell->laws.n_memory; j++) {

@@ -313,7 +313,7 @@ static void put_as_new(void **state)
     }
     for (bt_idx k = 0; k < w->cells->n; k++)
         for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++, n_pairs++)
-            w->cells->cell[k].search.pairs[j].n_points = 1;
+            w->cells->cell[k].search.pairs[j].contact = 0;
     assert_int_equal(n_pairs, 2);
     assert_false(w->cells->relabel);
     b->home[of[0]].x = -1e-20;
@@ -334,7 +334,7 @@ static void put_as_new(void **state)
     for (bt_idx k = 0; k < w->cells->n; k++)
         for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++) {
             const bt_pair *p = &w->cells->cell[k].search.pairs[j];
-            assert_int_equal(p->n_points, p->a == of[0] || p->a == of[1] ? 0 : 1);
+            assert_int_equal(p->contact, p->a == of[0] || p->a == of[1] ? -1 : 0);
         }
     bt_world_free(w);
 }
