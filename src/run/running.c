@@ -67,6 +67,8 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
         again ? bt_record_reopen(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err)
               : bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, r->digests, err);
     bt_gather_free(&b);
+    free(r->roster.thickness); // result.h5 has it
+    r->roster.thickness = NULL;
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
