@@ -384,7 +384,7 @@ MUTANTS = {
         ("s->un = w->par.water_v * t->ux - w->par.water_u * t->uy;", "s->un = 0;", "no cross current on the vessel"),
         ("s->kn = s->lateral * s->kd;", "s->kn = s->kd;", "drag across as along"),
         ("bt_max(0, along);", "along;", "thrust grows astern"),
-        ("b->ry = p->s * b->hull_x + p->c * b->hull_y;", "b->ry = p->s * b->hull_x - p->c * b->hull_y;", "hull point"),
+        ("b->ry = sine * b->hull_x + cosine * b->hull_y;", "b->ry = sine * b->hull_x - cosine * b->hull_y;", "hull point"),
         ("b->rxl = b->rx * b->ly - b->ry * b->lx;", "b->rxl = 0;", "the line does not turn the body"),
         ("t->body_w[k] = inv.m + inv.i * b->rxl * b->rxl;", "t->body_w[k] = inv.m;", "compliance without the turn"),
         ("+ inv.i * first->rxl * second->rxl", "", "branches are not coupled by the turn"),

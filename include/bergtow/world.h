@@ -35,7 +35,7 @@ typedef enum {
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
 /// 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_inv { double m, i; } bt_inv;
-typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
+typedef struct bt_pose { double x, y, yaw; } bt_pose;          ///< m, m, rad
 
 /// Where a floe of a moving window belongs (window.h).
 typedef struct bt_home {

@@ -156,12 +156,12 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 
 void bt_bodies_turn(bt_bodies *b, bt_idx i)
 {
-    bt_pose *p = &b->pose[i];
-    bt_sincos(p->yaw, &p->s, &p->c);
+    double s, c;
+    bt_sincos(b->pose[i].yaw, &s, &c);
     for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
         const double *v = b->vertices + 2 * k;
-        b->outline[2 * k] = p->c * v[0] - p->s * v[1];
-        b->outline[2 * k + 1] = p->s * v[0] + p->c * v[1];
+        b->outline[2 * k] = c * v[0] - s * v[1];
+        b->outline[2 * k + 1] = s * v[0] + c * v[1];
     }
 }
 

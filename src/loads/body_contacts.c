@@ -18,6 +18,7 @@ _Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a contact is a ro
 typedef struct {
     bt_body_contact *row;
     int64_t n, cap;
+    double c, s; ///< of the yaw of the towed body at X1
 } contact_rows;
 
 /// Interior angle of the outline of body i, rad, where vertex v of its part stands; NaN when there is no such vertex.
@@ -52,7 +53,7 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
 }
 
 static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, bt_idx j,
-                              bt_idx towed)
+                              bt_idx towed, double c, double s)
 {
     const bt_bodies *b = &w->bodies;
     const bt_contact *u = &cell->contacts[j];
@@ -74,9 +75,8 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
     if (v1 < 0 && v2 > v1) collision = coupled > 0 ? bt_min(total, (v2 - v1) / coupled) : total;
 
     // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
-    const bt_pose *p = &b->pose[towed];
     const double along = is_b ? u->rbt : u->rat;
-    const double nx = p->c * u->nx + p->s * u->ny, ny = p->c * u->ny - p->s * u->nx;
+    const double nx = c * u->nx + s * u->ny, ny = c * u->ny - s * u->nx;
     bt_body_contact t = {
         .gid = (double)b->gid[other],
         .x = along * nx + arm * ny,
@@ -115,7 +115,7 @@ static void add_cell(const bt_world *w, const bt_impacts *m, bt_idx k, contact_r
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-        const bt_body_contact t = row_of(w, m, cell, j, towed);
+        const bt_body_contact t = row_of(w, m, cell, j, towed, to->c, to->s);
         add(to, &t);
     }
 }
@@ -137,12 +137,13 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     contact_rows all = {0};
+    bt_sincos(w->bodies.pose[towed].yaw, &all.s, &all.c);
     if (!BT_MANY(ts->n_order - from, BT_FEW_CELLS))
         for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &all);
     else {
 #pragma omp parallel
         {
-            contact_rows mine = {0};
+            contact_rows mine = {.c = all.c, .s = all.s};
 #pragma omp for schedule(dynamic, 16)
             for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &mine);
 #pragma omp critical

@@ -20,7 +20,7 @@
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
 //   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, lap
-//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length,
+//                     D outline (a function of the yaw alone), gid, offset, mark, vertices, per_length,
 //                       radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no

@@ -97,7 +97,7 @@ static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
     const bt_window *v = w->window;
     const bt_home *h = &w->bodies.home[i];
     int32_t across = 0;
-    bt_pose p = {.yaw = h->yaw, .c = bt_cos(h->yaw), .s = bt_sin(h->yaw)};
+    bt_pose p = {.yaw = h->yaw};
     p.x = bt_into_period(h->x + w->undisturbed->drift_x, w->par.x0, v->length, turns);
     p.y = bt_into_period(h->y + w->undisturbed->drift_y, w->par.y0, w->par.period_y, &across);
     return p;
@@ -137,11 +137,13 @@ static candidate *collect(const bt_world *w, size_t *n, shapes *shape)
                 mine[m] = (candidate){.gid = b->gid[i], .place = p, .radius = b->radius[i], .mass = b->mass[i],
                                       .inertia = b->inertia[i], .was = b->vel[i], .n = count};
             m++;
+            double s, c;
+            bt_sincos(p.yaw, &s, &c);
             for (int64_t k = 0; pass && k < count; k++) {
                 const double *q = b->vertices + 2 * (b->offset[i] + k);
                 double *to = own.vertex + 2 * (n_vertices + (size_t)k);
-                to[0] = p.c * q[0] - p.s * q[1];
-                to[1] = p.s * q[0] + p.c * q[1];
+                to[0] = c * q[0] - s * q[1];
+                to[1] = s * q[0] + c * q[1];
                 own.mark[n_vertices + (size_t)k] = b->mark[b->offset[i] + k];
             }
             n_vertices += (size_t)count;
