@@ -80,7 +80,7 @@ static bt_status record_frame(run *r, bt_errors *err)
 {
     if (!r->record) return BT_OK;
     r->framed = r->w->step;
-    bt_solver_rest(r->w->solver);
+    bt_solver_rest(r->w);
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     const bt_frame_line line = bt_gather_line(r->w);

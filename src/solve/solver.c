@@ -25,20 +25,26 @@ bt_solver *bt_solver_create(void)
     return s;
 }
 
-void bt_solver_free(bt_solver *s)
-{
-    if (!s) return;
-    bt_islands_free(s->islands);
-    bt_solver_rest(s);
-    free(s);
-}
-
-void bt_solver_rest(bt_solver *s)
+static void give_back(bt_solver *s)
 {
     free(s->before);
     free(s->shift);
     s->before = s->shift = NULL;
     s->cap_before = s->cap_bodies = 0;
+}
+
+void bt_solver_free(bt_solver *s)
+{
+    if (!s) return;
+    bt_islands_free(s->islands);
+    give_back(s);
+    free(s);
+}
+
+void bt_solver_rest(bt_world *w)
+{
+    give_back(w->solver);
+    bt_cells_rest(w->cells);
 }
 
 /// The line, in the pass of the last cell on the rank that owns the large bodies.

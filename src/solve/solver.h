@@ -67,7 +67,7 @@ void bt_solver_free(bt_solver *s);
 void bt_solver_solve(bt_world *w);
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
-void bt_solver_rest(bt_solver *s);
+void bt_solver_rest(bt_world *w);
 
 /// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
 void bt_solver_make_shift(bt_world *w);

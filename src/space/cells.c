@@ -26,6 +26,11 @@ static void free_work(bt_work_list *k)
     k->n_list = k->cap_list = k->n_batches = k->cap_batches = 0;
 }
 
+void bt_cells_rest(bt_cells *t)
+{
+    for (bt_idx k = 0; k < t->n; k++) free_work(&t->cell[k].work);
+}
+
 void bt_cells_idle(bt_cell *t)
 {
     free(t->search.pairs);

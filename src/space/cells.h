@@ -233,6 +233,9 @@ void bt_cells_sort_busy(bt_cells *t);
 /// Leave out of the list what is at rest, idle, and not moved by contacts.
 void bt_cells_leave(bt_cells *t);
 
+/// Give back what sweeps take anew in the next step.
+void bt_cells_rest(bt_cells *t);
+
 /// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
 void bt_cells_idle(bt_cell *t);
 
