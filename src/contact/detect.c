@@ -182,8 +182,9 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         double gap;
         int32_t axis = p->axis;
         bt_manifold *m = bt_pack_next(&s->pack, i);
-        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin,
-                                             p->contact >= 0 ? (int)(t->gaps[p->contact].feature[0] >> 31) : -1, m, &gap, &axis);
+        const int reference_before = p->contact >= 0 ? (int)(t->gaps[p->contact].feature[0] >> 31) : -1;
+        const bool touch =
+            bt_contacts_parts(w, p->a, p->b, p->part, t->margin, reference_before, m, &gap, &axis);
         p->axis = (int16_t)axis;
         p->reach = gap + paths;
         if (!touch) {
