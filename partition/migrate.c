@@ -90,7 +90,7 @@ static char *vertices_of(const bt_bodies *b, int k, int64_t first)
 
 static void pack(const bt_bodies *b, bt_idx i, parcels *p, int rank)
 {
-    for (int k = 0; k < bt_n_body_fields; k++) add(p, rank, field_of(b, k, i), bt_body_fields[k].size);
+    for (int k = 0; k < bt_bodies_n_fields(b); k++) add(p, rank, field_of(b, k, i), bt_body_fields[k].size);
     const int64_t first = b->offset[i], n = b->offset[i + 1] - first;
     add(p, rank, &n, sizeof n);
     for (int k = 0; k < bt_n_vertex_fields; k++)
@@ -104,12 +104,12 @@ static void unpack(bt_bodies *b, const char *data, size_t n_bytes)
     while (at < n_bytes) {
         int64_t n;
         size_t record = 0;
-        for (int k = 0; k < bt_n_body_fields; k++) record += bt_body_fields[k].size;
+        for (int k = 0; k < bt_bodies_n_fields(b); k++) record += bt_body_fields[k].size;
         memcpy(&n, data + at + record, sizeof n);
         const int64_t first = b->offset[b->n];
         bt_bodies_reserve(b, b->n + 1, first + n);
         const bt_idx i = b->n++;
-        for (int k = 0; k < bt_n_body_fields; k++) {
+        for (int k = 0; k < bt_bodies_n_fields(b); k++) {
             memcpy(field_of(b, k, i), data + at, bt_body_fields[k].size);
             at += bt_body_fields[k].size;
         }
@@ -130,7 +130,7 @@ static void compact(bt_bodies *b, const uint8_t *keep)
     for (bt_idx i = 0; i < b->n; i++) {
         if (!keep[i]) continue;
         if (n != i) {
-            for (int k = 0; k < bt_n_body_fields; k++)
+            for (int k = 0; k < bt_bodies_n_fields(b); k++)
                 memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
             const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
             for (int k = 0; k < bt_n_vertex_fields; k++)
@@ -147,7 +147,7 @@ static void shrink(bt_bodies *b)
 {
     const bt_idx cap = b->n + b->n / 8 + 16;
     if (b->cap <= cap + cap / 4) return;
-    for (int k = 0; k < bt_n_body_fields; k++) {
+    for (int k = 0; k < bt_bodies_n_fields(b); k++) {
         void **array = (void **)((char *)b + bt_body_fields[k].array),
              *small = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
         memcpy(small, *array, (size_t)b->n * bt_body_fields[k].size);

@@ -294,8 +294,8 @@ static bt_gid find_fault(const bt_world *w)
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
         const double state[] = {
-            p->x,          p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->disturbed[i], b->home[i].copy,
-            b->home[i].lap};
+            p->x,          p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->disturbed[i],
+            b->home ? b->home[i].copy : 0, b->lap[i]};
         uint64_t h = 0;
         for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
             uint64_t u;

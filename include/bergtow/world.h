@@ -35,14 +35,12 @@ typedef enum {
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
 /// 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_inv { double m, i; } bt_inv;
-typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
+typedef struct bt_pose { double x, y, yaw; } bt_pose;          ///< m, m, rad
 
 /// Where a floe of a moving window belongs (window.h).
 typedef struct bt_home {
     double x, y, yaw; ///< pose in the field as made, m, m, rad
     int32_t copy;     ///< which repetition of that place, in lengths of the period along x
-    /// periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
-    int32_t lap;
 } bt_home;
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
@@ -112,7 +110,9 @@ typedef struct bt_bodies {
     /// by code that changes a pose or velocity itself
     uint8_t *disturbed;
     int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
-    bt_home *home;        ///< [n]
+    /// [n] periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    int32_t *lap;
+    bt_home *home;        ///< [n] with a moving window, otherwise NULL
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
     bt_gid n_global;

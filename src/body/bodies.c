@@ -13,9 +13,13 @@
 const bt_body_field bt_body_fields[] = {
     FIELD(vel),       FIELD(inv),  FIELD(pose),   FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
     FIELD(radius),    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share),     FIELD(friction), FIELD(restitution),
-    FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(home),
+    FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(lap),
+    FIELD(home),
 };
-const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
+int bt_bodies_n_fields(const bt_bodies *b)
+{
+    return (int)(sizeof bt_body_fields / sizeof *bt_body_fields) - (b->home == NULL);
+}
 
 const bt_body_field bt_vertex_fields[] = {
     {offsetof(bt_bodies, vertices), 2 * sizeof(double)},
@@ -27,7 +31,7 @@ const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_field
 
 void bt_bodies_free(bt_bodies *b)
 {
-    for (int k = 0; k < bt_n_body_fields; k++) free(*(void **)((char *)b + bt_body_fields[k].array));
+    for (int k = 0; k < bt_bodies_n_fields(b); k++) free(*(void **)((char *)b + bt_body_fields[k].array));
     for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)b + bt_vertex_fields[k].array));
     free(b->offset);
     free(b->index_of);
@@ -37,7 +41,7 @@ void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
 {
     if (n > b->cap) {
         const bt_idx cap = b->cap == 0 ? n : n > b->cap + b->cap / 4 ? n : b->cap + b->cap / 4;
-        for (int k = 0; k < bt_n_body_fields; k++) {
+        for (int k = 0; k < bt_bodies_n_fields(b); k++) {
             void **array = (void **)((char *)b + bt_body_fields[k].array), *old = *array;
             *array = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
             if (old) memcpy(*array, old, (size_t)b->n * bt_body_fields[k].size);
@@ -55,6 +59,8 @@ void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
         b->cap_vertices = cap;
     }
 }
+
+void bt_bodies_make_homes(bt_bodies *b) { b->home = bt_alloc_aligned((size_t)b->cap, sizeof *b->home); }
 
 /// Marks and lengths of the n vertices of one polygon, from `first` on.
 static void close_polygon(bt_bodies *b, int64_t first, int n)
@@ -143,19 +149,19 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
     b->large[i] = d->large;
     b->disturbed[i] = 1;
     b->cell[i][0] = b->cell[i][1] = 0;
-    b->home[i] = (bt_home){0};
+    b->lap[i] = 0;
     bt_bodies_turn(b, i);
     return b->gid[i];
 }
 
 void bt_bodies_turn(bt_bodies *b, bt_idx i)
 {
-    bt_pose *p = &b->pose[i];
-    bt_sincos(p->yaw, &p->s, &p->c);
+    double s, c;
+    bt_sincos(b->pose[i].yaw, &s, &c);
     for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
         const double *v = b->vertices + 2 * k;
-        b->outline[2 * k] = p->c * v[0] - p->s * v[1];
-        b->outline[2 * k + 1] = p->s * v[0] + p->c * v[1];
+        b->outline[2 * k] = c * v[0] - s * v[1];
+        b->outline[2 * k + 1] = s * v[0] + c * v[1];
     }
 }
 

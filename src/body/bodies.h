@@ -13,7 +13,8 @@ typedef struct bt_body_field {
     size_t size;  ///< bytes a body
 } bt_body_field;
 extern const bt_body_field bt_body_fields[];
-extern const int bt_n_body_fields;
+/// How many there are: the last one, the homes, only where these bodies have them.
+int bt_bodies_n_fields(const bt_bodies *b);
 
 /// Arrays over the vertices of the bodies; size: bytes a vertex.
 extern const bt_body_field bt_vertex_fields[];
@@ -22,6 +23,9 @@ extern const int bt_n_vertex_fields;
 /// Room for n bodies and n_vertices vertices.
 void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 void bt_bodies_free(bt_bodies *b);
+
+/// Room for the homes of all bodies, 0, before they are distributed to ranks.
+void bt_bodies_make_homes(bt_bodies *b);
 
 /// Add a body (bt_world_add); returns its gid.
 bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);

@@ -192,16 +192,16 @@ static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
     if (deepest == 0) return;
-    const bt_pair *p = &t->search.pairs[t->contacts[j].pair];
-    bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
+    const uint32_t *feature = t->gaps[j].feature;
+    bt_memory r = bt_law_names(w, &t->search.pairs[u->pair], BT_LAW_CRUSHING);
     // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
     for (int i = 0; i < u->n; i++)
-        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, p->feature[i], l->depth[i], false);
+        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, feature[i], l->depth[i], false);
     for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++) {
         const bt_memory *before = &t->laws.memory[at];
         if (before->value[i] > 0) keep_depth(&r, before->feature[i], before->value[i], true);
     }
-    for (int i = 0; i < u->n; i++) keep_depth(&r, p->feature[i], l->depth[i], false);
+    for (int i = 0; i < u->n; i++) keep_depth(&r, feature[i], l->depth[i], false);
     bt_law_put(t, at, &r);
 }
 

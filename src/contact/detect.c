@@ -127,7 +127,7 @@ static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
     size_t kept = 0;
     for (size_t k = 0; k < s->n; k++) {
         if (s->man[k].n_points == 0) {
-            t->search.pairs[s->pair[k]].n_points = 0;
+            t->search.pairs[s->pair[k]].contact = -1;
             continue;
         }
         s->man[kept] = s->man[k];
@@ -153,7 +153,7 @@ static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
                 bt_pack_keep(s);
             } else {
                 s->man[k] = *sheets;
-                p->n_points = 0;
+                p->contact = -1;
             }
         }
     }
@@ -174,7 +174,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         bt_pair *p = &t->search.pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
         if (paths + t->margin < p->reach) {
-            p->n_points = 0;
+            p->contact = -1;
             if (!near && !(paths + far < p->reach)) bt_pairs_add_near(t, i);
             continue;
         }
@@ -182,12 +182,13 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         double gap;
         int32_t axis = p->axis;
         bt_manifold *m = bt_pack_next(&s->pack, i);
-        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin,
-                                             p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &axis);
+        const int reference_before = p->contact >= 0 ? (int)(t->gaps[p->contact].feature[0] >> 31) : -1;
+        const bool touch =
+            bt_contacts_parts(w, p->a, p->b, p->part, t->margin, reference_before, m, &gap, &axis);
         p->axis = (int16_t)axis;
         p->reach = gap + paths;
         if (!touch) {
-            p->n_points = 0;
+            p->contact = -1;
             continue;
         }
         bt_pack_keep(&s->pack);

@@ -20,6 +20,7 @@ void bt_pack_scratch_free(bt_pack_scratch *s)
 {
     free(s->man);
     free(s->pair);
+    free(s->held);
     free(s->colour);
     free(s->used);
     *s = (bt_pack_scratch){0};
@@ -32,6 +33,7 @@ void bt_pack_begin(bt_pack_scratch *s, size_t n)
     s->cap = n + n / 2 + 16;
     s->man = bt_realloc(s->man, s->cap, sizeof *s->man);
     s->pair = bt_realloc(s->pair, s->cap, sizeof *s->pair);
+    s->held = bt_realloc(s->held, s->cap, sizeof *s->held);
     s->colour = bt_realloc(s->colour, s->cap, sizeof *s->colour);
 }
 
@@ -86,15 +88,28 @@ static int colour_contacts(const bt_world *w, const bt_cell *t, bt_pack_scratch 
     return n_colours;
 }
 
-static void inherit(const bt_manifold *m, const bt_pair *p, bt_contact *u)
+/// The contacts of the step before, whose memory that of this step takes.
+static void hold(const bt_cell *t, bt_pack_scratch *s)
+{
+    for (size_t k = 0; k < s->n; k++) {
+        const bt_idx at = t->search.pairs[s->pair[k]].contact;
+        s->held[k].n = 0;
+        if (at < 0) continue;
+        const bt_contact *u = &t->contacts[at];
+        const bt_gaps *g = &t->gaps[at];
+        s->held[k] = (bt_held){u->n, {g->feature[0], g->feature[1]}, {u->ln[0], u->ln[1]}, u->lt};
+    }
+}
+
+static void inherit(const bt_manifold *m, const bt_held *h, bt_contact *u)
 {
     for (int i = 0; i < m->n_points; i++)
-        for (int j = 0; j < p->n_points; j++)
-            if (p->feature[j] == m->p[i].feature) u->ln[i] = p->ln[j];
+        for (int j = 0; j < h->n; j++)
+            if (h->feature[j] == m->p[i].feature) u->ln[i] = h->ln[j];
     // The friction of the points is one number: it stays with the normal impulses that stay.
-    const double before = p->n_points > 1 ? p->ln[0] + p->ln[1] : p->n_points > 0 ? p->ln[0] : 0;
+    const double before = h->n > 1 ? h->ln[0] + h->ln[1] : h->n > 0 ? h->ln[0] : 0;
     const double kept = u->ln[0] + u->ln[1];
-    u->lt = before == 0 ? 0 : kept == before ? p->lt : p->lt * (kept / before);
+    u->lt = before == 0 ? 0 : kept == before ? h->lt : h->lt * (kept / before);
 }
 
 /// Sheets that lie on each other (contact/raft.h): components along x and y, one step length for both.
@@ -113,7 +128,7 @@ static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt
     u->mn[0] = u->mt = 1 / u->w[0];
 }
 
-static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_contact *u,
+static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_held *h, bt_contact *u,
                          bt_gaps *g)
 {
     const bt_bodies *b = &w->bodies;
@@ -129,6 +144,7 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
         u->w[i] = ia.m + ib.m + ia.i * u->ran[i] * u->ran[i] + ib.i * u->rbn[i] * u->rbn[i];
         u->mn[i] = 1 / u->w[i];
         g->gap[i] = q->gap;
+        g->feature[i] = q->feature;
     }
     u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
     u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
@@ -139,7 +155,7 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
         const double det = u->w[0] * u->w[1] - u->w12 * u->w12;
         u->per_det = det > 1e-9 * u->w[0] * u->w[1] ? 1 / det : 0;
     }
-    if (w->par.warm_start) inherit(m, p, u);
+    if (w->par.warm_start) inherit(m, h, u);
     bt_pack_bias(w, u, g, 1);
 }
 
@@ -170,8 +186,9 @@ void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double sha
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
 {
     bt_cell *t = &w->cells->cell[k];
+    hold(t, s);
     if ((bt_idx)s->n > t->cap_contacts) {
-        t->cap_contacts = (bt_idx)(s->n + s->n / 4);
+        t->cap_contacts = (bt_idx)(s->n + s->n / 8);
         free(t->contacts);
         free(t->gaps);
         t->contacts = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->contacts);
@@ -194,25 +211,11 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
             bt_laws_bound(w, t, at, p, &s->man[i]);
             continue;
         }
-        fill_contact(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
+        fill_contact(w, &s->man[i], s->pair[i], &s->held[i], u, &t->gaps[at]);
         if (bounded) {
             bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
-        p->n_points = (int16_t)u->n;
-        for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
-    }
-}
-
-void bt_pack_store(bt_world *w, bt_idx k)
-{
-    bt_cell *t = &w->cells->cell[k];
-    for (bt_idx i = 0; i < t->n_contacts; i++) {
-        const bt_contact *u = &t->contacts[i];
-        if (u->n == 0) continue; // sheets have a record (contact/raft.h)
-        bt_pair *p = &t->search.pairs[u->pair];
-        p->ln[0] = u->ln[0];
-        p->ln[1] = u->ln[1];
-        p->lt = u->lt;
+        p->contact = at;
     }
 }

@@ -6,10 +6,18 @@
 #include "contact/contacts.h"
 #include "space/cells.h"
 
+/// What a contact hands on to the one that takes its place.
+typedef struct bt_held {
+    int32_t n;           ///< points, 0 = there was none
+    uint32_t feature[2];
+    double ln[2], lt;    ///< N s
+} bt_held;
+
 /// Manifolds of one cell, in the order of its pairs; one a thread.
 typedef struct bt_pack_scratch {
     bt_manifold *man; ///< [n]
     bt_idx *pair;     ///< [n] which pair
+    bt_held *held;    ///< [n] contact of that pair in the step before
     uint8_t *colour;  ///< [n]
     size_t n, cap;
     uint64_t *used;   ///< colours taken at each body of the block
@@ -21,14 +29,11 @@ void bt_pack_begin(bt_pack_scratch *s, size_t n);
 /// Place for the next manifold, of pair i; it counts once kept.
 bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i);
 void bt_pack_keep(bt_pack_scratch *s);
-/// The contacts of cell k from the manifolds kept, with the impulses of the pairs (without warm start: 0).
+/// The contacts of cell k from the manifolds kept, with the impulses of those in their places (without warm start: 0).
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s);
 void bt_pack_scratch_free(bt_pack_scratch *s);
 
 /// Normal biases of a contact with these gaps, `share`: factor on the restitution.
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
-
-/// Impulses and features of the contacts into the pairs, for the next detection.
-void bt_pack_store(bt_world *w, bt_idx k);
 
 #endif

@@ -18,6 +18,7 @@ _Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a contact is a ro
 typedef struct {
     bt_body_contact *row;
     int64_t n, cap;
+    double c, s; ///< of the yaw of the towed body at X1
 } contact_rows;
 
 /// Interior angle of the outline of body i, rad, where vertex v of its part stands; NaN when there is no such vertex.
@@ -51,12 +52,12 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
-                                bt_idx towed)
+static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, bt_idx j,
+                              bt_idx towed, double c, double s)
 {
     const bt_bodies *b = &w->bodies;
+    const bt_contact *u = &cell->contacts[j];
     const bool is_b = u->b == towed;
-    const bt_pair *pair = &cell->search.pairs[u->pair];
     const bt_idx other = is_b ? u->a : u->b;
     const double sign = is_b ? 1 : -1, total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};
     const bt_inv ia = bare(b, u->a), ib = bare(b, u->b);
@@ -74,9 +75,8 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
     if (v1 < 0 && v2 > v1) collision = coupled > 0 ? bt_min(total, (v2 - v1) / coupled) : total;
 
     // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
-    const bt_pose *p = &b->pose[towed];
     const double along = is_b ? u->rbt : u->rat;
-    const double nx = p->c * u->nx + p->s * u->ny, ny = p->c * u->ny - p->s * u->nx;
+    const double nx = c * u->nx + s * u->ny, ny = c * u->ny - s * u->nx;
     bt_body_contact t = {
         .gid = (double)b->gid[other],
         .x = along * nx + arm * ny,
@@ -90,7 +90,8 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, pair->part, pair->feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner = corner_of(b, u, cell->search.pairs[u->pair].part,
+                            cell->gaps[j].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];
@@ -114,7 +115,7 @@ static void add_cell(const bt_world *w, const bt_impacts *m, bt_idx k, contact_r
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-        const bt_body_contact t = row_of(w, m, cell, u, towed);
+        const bt_body_contact t = row_of(w, m, cell, j, towed, to->c, to->s);
         add(to, &t);
     }
 }
@@ -136,12 +137,13 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     contact_rows all = {0};
+    bt_sincos(w->bodies.pose[towed].yaw, &all.s, &all.c);
     if (!BT_MANY(ts->n_order - from, BT_FEW_CELLS))
         for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &all);
     else {
 #pragma omp parallel
         {
-            contact_rows mine = {0};
+            contact_rows mine = {.c = all.c, .s = all.s};
 #pragma omp for schedule(dynamic, 16)
             for (bt_idx i = from; i < ts->n_order; i++) add_cell(w, m, ts->order[i], &mine);
 #pragma omp critical

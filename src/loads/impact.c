@@ -172,13 +172,14 @@ void bt_impacts_take(bt_world *w)
 {
     bt_impacts *m = w->impacts;
     if (!m) return;
-    const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
     free(m->contact);
     m->contact = bt_body_contacts_collect(w, m, &m->n_contacts);
     m->n_closed = 0;
     follow_events(m, (double)(w->step + 1) * w->par.dt);
     bt_panels_clear(&m->panels);
-    add_loads(m, p->c, p->s);
+    double s, c;
+    bt_sincos(w->bodies.pose[bt_world_towed(w)].yaw, &s, &c);
+    add_loads(m, c, s);
 }
 
 void bt_impacts_end(bt_impacts *m)

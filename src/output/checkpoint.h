@@ -19,8 +19,8 @@
 // derived from case and field by the same functions as in a fresh run, - of one step alone:
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
-//   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, home.lap
-//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length,
+//   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, lap
+//                     D outline (a function of the yaw alone), gid, offset, mark, vertices, per_length,
 //                       radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no
@@ -31,11 +31,13 @@
 //                     D cell array, at, n_in_cells, labelled
 //                     - moved, moved_any, speed, bound, awake, busy, order, share, still
 //                     not needed: asleep (a cell that rests is found to do so again)
-//   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
+//   bt_pair           S of those in contact: part
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
 //                     (contacts.h)
 //   bt_memory         S all: what contact laws remember of pairs (contact/law.h)
-//   bt_contact, bt_limit, bt_solver, lists
+//   bt_contact        S n, ln, lt (warm start)    - the rest
+//   bt_gaps           S feature (warm start; reference edge)    - the rest
+//   bt_limit, bt_solver, lists
 //                     - all: the momentum starts anew in every solve
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way
 //                     D, - the rest

@@ -128,6 +128,8 @@ static void write_bodies(bt_frames *f, const bt_record_bodies *b)
 
 static void keep_outlines(bt_frames *f, const bt_record_bodies *b)
 {
+    f->bodies = b->all;
+    if (f->bodies) return;
     const int64_t n = f->own_floes + f->own_others, nv = b->offsets[n] - b->offsets[0];
     f->n_vertices = bt_alloc((size_t)n, sizeof *f->n_vertices);
     f->vertices = bt_alloc(2 * (size_t)nv, sizeof *f->vertices);
@@ -212,18 +214,35 @@ static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_fram
     bt_rows_end(&r);
 }
 
+/// Outline of body i of the block in its own frame, in single precision; returns its number of vertices. `at`: vertices
+/// of the block before it.
+static int outline_of(const bt_frames *f, int64_t i, int64_t at, float *v)
+{
+    if (!f->bodies) {
+        memcpy(v, f->vertices + 2 * at, 2 * f->n_vertices[i] * sizeof *v);
+        return f->n_vertices[i];
+    }
+    const bt_idx k = f->bodies->index_of[i]; // one rank's block is all bodies, by their ids
+    const double *own = f->bodies->vertices + 2 * f->bodies->offset[k];
+    const int n = bt_body_corners(f->bodies, k);
+    for (int c = 0; c < 2 * n; c++) v[c] = (float)own[c];
+    return n;
+}
+
 /// All vertices of bodies from .. from + n of the block in the world frame; `local`: vertices of the block before them.
 static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt_frame_row *row, int64_t from,
                          int64_t n, int64_t local, char *buffer)
 {
     bt_rows r = bt_rows_from(s, first, buffer);
-    const float *p = f->vertices + 2 * local;
+    float p[2 * BT_MAX_VERTICES];
     for (int64_t i = from; i < from + n; i++) {
         const double c = bt_cos(row[i].yaw), sine = bt_sin(row[i].yaw);
-        for (int v = 0; v < f->n_vertices[i]; v++, p += 2) {
+        const int corners = outline_of(f, i, local, p);
+        local += corners;
+        for (int v = 0; v < corners; v++) {
             float *to = bt_rows_next(&r);
-            to[0] = (float)(row[i].x + c * (double)p[0] - sine * (double)p[1]);
-            to[1] = (float)(row[i].y + sine * (double)p[0] + c * (double)p[1]);
+            to[0] = (float)(row[i].x + c * (double)p[2 * v] - sine * (double)p[2 * v + 1]);
+            to[1] = (float)(row[i].y + sine * (double)p[2 * v] + c * (double)p[2 * v + 1]);
         }
     }
     bt_rows_end(&r);

@@ -12,6 +12,7 @@ typedef struct bt_frames {
     int64_t n_floes, n_others;      ///< of all ranks: floes, other bodies
     int64_t first;                  ///< first body of this rank's block
     int64_t own_floes, own_others;  ///< of the block
+    const bt_bodies *bodies;        ///< whose outlines are drawn; NULL = those of a copy:
     float *vertices;                ///< [vertices of the block][2] m, own frame
     uint8_t *n_vertices;            ///< [bodies of the block]
     int64_t floe_vertices, other_vertices; ///< of all ranks

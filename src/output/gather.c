@@ -115,6 +115,7 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
                               .thickness = thickness,
                               .area = area,
                               .names = roster->names,
+                              .all = c->size == 1 ? b : NULL,
                               .towed = (bt_idx)w->towed,
                               .branches = bt_tow_has_line(w->tow) ? w->tow->n_branches : 0};
     if (status != BT_OK) bt_gather_free(out);

@@ -128,6 +128,8 @@ typedef struct bt_record_bodies {
     const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
     bt_idx towed;                ///< index of the towed body among all, −1 = none
     int branches;                ///< of the tow line, 0 = none
+    /// where this rank holds them all, while the record is open: frames draw their outlines; NULL = those of a copy
+    const bt_bodies *all;
 } bt_record_bodies;
 
 /// A body in a frame.

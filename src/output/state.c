@@ -194,8 +194,8 @@ static body_row row_of(const bt_bodies *b, bt_idx i)
         .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
         .path = b->path[i],
         .cell = {b->cell[i][0], b->cell[i][1]},
-        .copy = b->home[i].copy,
-        .lap = b->home[i].lap,
+        .copy = b->home ? b->home[i].copy : 0,
+        .lap = b->lap[i],
         .disturbed = b->disturbed[i],
     };
 }
@@ -209,8 +209,8 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
     b->path[i] = r->path;
     b->cell[i][0] = r->cell[0];
     b->cell[i][1] = r->cell[1];
-    b->home[i].copy = r->copy;
-    b->home[i].lap = r->lap;
+    if (b->home) b->home[i].copy = r->copy;
+    b->lap[i] = r->lap;
     b->disturbed[i] = r->disturbed != 0;
 }
 

@@ -161,8 +161,9 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, isfinite(p->x) && isfinite(p->y) && isfinite(p->yaw), "bodies/pose", g, "is not finite");
         bt_snapshot_want(s, isfinite(v->x) && isfinite(v->y) && isfinite(v->w), "bodies/velocity", g, "is not finite");
         bt_snapshot_want(s, isfinite(b->path[i]) && b->path[i] >= 0, "bodies/path", g, "is no length");
-        bt_snapshot_want(s, b->home[i].copy >= -FAR && b->home[i].copy <= FAR, "bodies/copy", g, "is out of range");
-        bt_snapshot_want(s, b->home[i].lap >= -FAR && b->home[i].lap <= FAR, "bodies/lap", g, "is out of range");
+        const int32_t copy = b->home ? b->home[i].copy : 0;
+        bt_snapshot_want(s, copy >= -FAR && copy <= FAR, "bodies/copy", g, "is out of range");
+        bt_snapshot_want(s, b->lap[i] >= -FAR && b->lap[i] <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
         bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the cells");
         bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/tile", g,

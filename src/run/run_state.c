@@ -53,7 +53,7 @@ static void save_case(const bt_case *c, bt_snapshot *s)
 
 bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err)
 {
-    bt_solver_rest(r->w->solver);
+    bt_solver_rest(r->w);
     if (r->comm->rank == 0) bt_checkpoint_begin(s, r->o->dir, name, err);
     bt_status status = bt_state_save(r->w, r->comm, s, err);
     if (r->comm->rank == 0) {

@@ -67,6 +67,8 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
         again ? bt_record_reopen(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err)
               : bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, r->digests, err);
     bt_gather_free(&b);
+    free(r->roster.thickness); // result.h5 has it
+    r->roster.thickness = NULL;
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
@@ -78,7 +80,7 @@ static bt_status record_frame(run *r, bt_errors *err)
 {
     if (!r->record) return BT_OK;
     r->framed = r->w->step;
-    bt_solver_rest(r->w->solver);
+    bt_solver_rest(r->w);
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     const bt_frame_line line = bt_gather_line(r->w);

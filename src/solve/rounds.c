@@ -44,7 +44,7 @@ void bt_rounds_list(bt_cell *cell)
     cell->work.n_list = 0;
     cell->work.bad = false;
     if (cell->n_contacts <= cell->work.cap_list) return;
-    cell->work.cap_list = cell->n_contacts + cell->n_contacts / 4;
+    cell->work.cap_list = cell->n_contacts + cell->n_contacts / 8;
     free(cell->work.list);
     free(cell->work.before);
     cell->work.list = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.list);

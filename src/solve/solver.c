@@ -10,7 +10,6 @@
 #include "solve/batch.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
-#include "contact/pack.h"
 #include "space/phases.h"
 #include "solve/islands.h"
 #include "solve/restitution.h"
@@ -26,20 +25,26 @@ bt_solver *bt_solver_create(void)
     return s;
 }
 
-void bt_solver_free(bt_solver *s)
-{
-    if (!s) return;
-    bt_islands_free(s->islands);
-    bt_solver_rest(s);
-    free(s);
-}
-
-void bt_solver_rest(bt_solver *s)
+static void give_back(bt_solver *s)
 {
     free(s->before);
     free(s->shift);
     s->before = s->shift = NULL;
     s->cap_before = s->cap_bodies = 0;
+}
+
+void bt_solver_free(bt_solver *s)
+{
+    if (!s) return;
+    bt_islands_free(s->islands);
+    give_back(s);
+    free(s);
+}
+
+void bt_solver_rest(bt_world *w)
+{
+    give_back(w->solver);
+    bt_cells_rest(w->cells);
 }
 
 /// The line, in the pass of the last cell on the rank that owns the large bodies.
@@ -300,12 +305,6 @@ static bool warm_start(bt_world *w)
     return pressed > 0;
 }
 
-static void store(bt_world *w, bt_idx k, const void *context, bt_totals *t)
-{
-    (void)context, (void)t;
-    bt_pack_store(w, k);
-}
-
 static void sweep_to_tolerance(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
@@ -326,7 +325,6 @@ static void sweep_to_tolerance(bt_world *w)
     st->residual = work.residual;
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
     st->converged = work.residual <= p.tolerance;
-    bt_phases_any_order(w, store, NULL, &(bt_totals){0});
     bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
 }
 

@@ -60,14 +60,14 @@ bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
 /// Collective. Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes U2,
-/// contacts and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// contacts get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive.
 void bt_solver_solve(bt_world *w);
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
-void bt_solver_rest(bt_solver *s);
+void bt_solver_rest(bt_world *w);
 
 /// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
 void bt_solver_make_shift(bt_world *w);

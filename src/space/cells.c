@@ -26,6 +26,11 @@ static void free_work(bt_work_list *k)
     k->n_list = k->cap_list = k->n_batches = k->cap_batches = 0;
 }
 
+void bt_cells_rest(bt_cells *t)
+{
+    for (bt_idx k = 0; k < t->n; k++) free_work(&t->cell[k].work);
+}
+
 void bt_cells_idle(bt_cell *t)
 {
     free(t->search.pairs);
@@ -257,7 +262,7 @@ static void **array_of(bt_bodies *b, int k) { return (void **)((char *)b + bt_bo
 static void permute(bt_bodies *b, const sort_key *key)
 {
     const size_t n = (size_t)b->n;
-    for (int k = 0; k < bt_n_body_fields; k++) {
+    for (int k = 0; k < bt_bodies_n_fields(b); k++) {
         const size_t size = bt_body_fields[k].size;
         char *old = *array_of(b, k), *new = bt_alloc_aligned((size_t)b->cap, size);
         for (size_t i = 0; i < n; i++) memcpy(new + i * size, old + (size_t)key[i].from * size, size);
@@ -389,10 +394,12 @@ void bt_cells_remember(bt_cell *t, const bt_memory *r)
     t->laws.memory[t->laws.n_memory++] = *r;
 }
 
-static bt_memory memory_of(const bt_gid *gid, const bt_pair *p)
+static bt_memory memory_of(const bt_gid *gid, const bt_cell *t, const bt_pair *p)
 {
-    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = p->n_points,
-                      .feature = {p->feature[0], p->feature[1]}, .value = {p->ln[0], p->ln[1], p->lt}};
+    const bt_contact *u = &t->contacts[p->contact];
+    const bt_gaps *g = &t->gaps[p->contact];
+    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = u->n,
+                      .feature = {g->feature[0], g->feature[1]}, .value = {u->ln[0], u->ln[1], u->lt}};
 }
 
 bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
@@ -401,7 +408,7 @@ bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
     int64_t cap = 0;
     for (bt_idx k = 0; k < t->n; k++) {
         for (bt_idx i = 0; t->cell[k].own && i < t->cell[k].search.n_pairs; i++)
-            cap += t->cell[k].search.pairs[i].n_points > 0;
+            cap += t->cell[k].search.pairs[i].contact >= 0;
         if (t->cell[k].own) cap += t->cell[k].laws.n_memory;
     }
     bt_memory *memory = bt_alloc((size_t)cap, sizeof *memory);
@@ -410,7 +417,8 @@ bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
         const bt_cell *cell = &t->cell[k];
         for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) memory[(*n)++] = cell->laws.memory[i];
         for (bt_idx i = 0; cell->own && i < cell->search.n_pairs; i++)
-            if (cell->search.pairs[i].n_points > 0) memory[(*n)++] = memory_of(w->bodies.gid, &cell->search.pairs[i]);
+            if (cell->search.pairs[i].contact >= 0)
+                memory[(*n)++] = memory_of(w->bodies.gid, cell, &cell->search.pairs[i]);
     }
     return memory;
 }
@@ -427,7 +435,24 @@ bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
     return bt_cells_at(t, at[0], at[1]);
 }
 
-/// Put memory, in any order, into the pair lists of empty cells.
+/// A pair that was in contact into the list of a cell that has had no detection yet.
+static void put_pair(bt_cell *t, bt_idx a, bt_idx b, const bt_memory *r)
+{
+    bt_pair_search *s = &t->search;
+    if (s->n_pairs == s->cap_pairs) {
+        t->cap_contacts = s->cap_pairs = s->cap_pairs ? 2 * s->cap_pairs : 16;
+        s->pairs = bt_realloc(s->pairs, (size_t)s->cap_pairs, sizeof *s->pairs);
+        t->contacts = bt_realloc(t->contacts, (size_t)s->cap_pairs, sizeof *t->contacts);
+        t->gaps = bt_realloc(t->gaps, (size_t)s->cap_pairs, sizeof *t->gaps);
+    }
+    const bt_idx at = s->n_pairs++;
+    s->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {r->part[0], r->part[1]}, .axis = -1,
+                             .reach = -INFINITY};
+    t->contacts[at] = (bt_contact){.n = r->n_points, .ln = {r->value[0], r->value[1]}, .lt = r->value[2]};
+    t->gaps[at] = (bt_gaps){.feature = {r->feature[0], r->feature[1]}};
+}
+
+/// Put memory, in any order, into empty cells.
 static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
 {
     bt_cells *t = w->cells;
@@ -437,22 +462,8 @@ static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
         // a floe that has shot so far away from a large body that its rank does not hold it any more
         if (a < 0 || b < 0) continue;
         bt_cell *cell = &t->cell[bt_cells_of_pair(w, a, b)];
-        if (memory[k].law != 0) {
-            bt_cells_remember(cell, &memory[k]);
-            continue;
-        }
-        if (cell->search.n_pairs == cell->search.cap_pairs) {
-            cell->search.cap_pairs = cell->search.cap_pairs ? 2 * cell->search.cap_pairs : 16;
-            cell->search.pairs =
-                bt_realloc(cell->search.pairs, (size_t)cell->search.cap_pairs, sizeof *cell->search.pairs);
-        }
-        bt_pair *p = &cell->search.pairs[cell->search.n_pairs++];
-        *p = (bt_pair){
-            .a = a, .b = b, .axis = -1, .n_points = (int16_t)memory[k].n_points, .reach = -INFINITY,
-            .lt = memory[k].value[2]};
-        memcpy(p->part, memory[k].part, sizeof p->part);
-        memcpy(p->feature, memory[k].feature, sizeof p->feature);
-        memcpy(p->ln, memory[k].value, sizeof p->ln);
+        if (memory[k].law != 0) bt_cells_remember(cell, &memory[k]);
+        else put_pair(cell, a, b, &memory[k]);
     }
 }
 

@@ -44,18 +44,18 @@
 /// the fifth phase is the cell of the large movable bodies
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
 
-/// A pair near enough to be looked at, and what its contact was in the last step.
+/// A pair near enough to be looked at.
 typedef struct bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
+    /// that of its points in the cell when last looked for, not of sheets; −1 = none. It hands its features and
+    /// impulses on to the contact that takes its place
+    bt_idx contact;
     uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
     int16_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
-    int16_t n_points;    ///< contact points in the last solution
-    uint32_t feature[2]; ///< of those
-    double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
     /// gap when last computed + path lengths of a and b then: no contact while paths + margin < reach
     double reach;
 } bt_pair;
-_Static_assert(sizeof(bt_pair) == 56, "a floe in dense ice has three, and each is kept from step to step");
+_Static_assert(sizeof(bt_pair) == 32, "a floe in dense ice has three, and each is kept from step to step");
 
 /// One manifold, in three cache lines: what batches are packed from (solve/batch.h); in the last cell and under rising
 /// bounds a sweep reads it itself, and writes the last line. Its two points are on a line along the tangent, so both
@@ -81,6 +81,7 @@ _Static_assert(sizeof(bt_contact) == 192, "three cache lines");
 typedef struct bt_gaps {
     double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
     double multiplier[2];  ///< multipliers of the position projection, kg m
+    uint32_t feature[2];   ///< of the points
 } bt_gaps;
 
 /// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).
@@ -89,7 +90,7 @@ typedef struct bt_memory {
     uint16_t part[2];    ///< as in bt_pair
     int32_t n_points;
     uint32_t feature[2]; ///< of the points
-    double value[4];     ///< rigid: impulses as in bt_pair (ln, lt), N s; of other laws: see there
+    double value[4];     ///< rigid: impulses as in bt_contact (ln, lt), N s; of other laws: see there
     uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
 } bt_memory;
 
@@ -143,8 +144,10 @@ typedef struct bt_cell {
     double margin;                  ///< m, of this step's detection
     bt_pair_search search;
     // contacts of this step
-    bt_contact *contacts;           ///< [n_contacts]
-    bt_gaps *gaps;                  ///< [n_contacts] of the contacts
+    /// [n_contacts]. After new labels there are none until the next detection: then [n_pairs], with what it takes over,
+    /// which is n, the impulses and the features
+    bt_contact *contacts;
+    bt_gaps *gaps;                  ///< of the contacts
     bt_idx n_contacts, cap_contacts;
     int64_t n_points;
     double overlap;                 ///< deepest, m
@@ -229,6 +232,9 @@ void bt_cells_wake_all(bt_cells *t);
 void bt_cells_sort_busy(bt_cells *t);
 /// Leave out of the list what is at rest, idle, and not moved by contacts.
 void bt_cells_leave(bt_cells *t);
+
+/// Give back what sweeps take anew in the next step.
+void bt_cells_rest(bt_cells *t);
 
 /// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
 void bt_cells_idle(bt_cell *t);

@@ -62,8 +62,8 @@ static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int 
 {
     if (*n == s->cap_found)
         s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
-    s->found[(*n)++] =
-        (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
+    s->found[(*n)++] = (bt_pair){.a = a, .b = b, .contact = -1, .part = {(uint16_t)part_a, (uint16_t)part_b},
+                                 .axis = -1, .reach = -INFINITY};
 }
 
 /// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
@@ -219,7 +219,7 @@ static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
             s->found[i] = t->search.pairs[k];
     }
     if (n > (size_t)t->search.cap_pairs) {
-        t->search.cap_pairs = (bt_idx)(n + n / 4);
+        t->search.cap_pairs = (bt_idx)(n + n / 8);
         free(t->search.pairs);
         t->search.pairs = bt_realloc(NULL, (size_t)t->search.cap_pairs, sizeof *t->search.pairs);
     }
@@ -258,7 +258,7 @@ bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin)
 void bt_pairs_add_near(bt_cell *t, bt_idx i)
 {
     if (t->search.n_near == t->search.cap_near) {
-        t->search.cap_near = t->search.cap_near ? 2 * t->search.cap_near : 16;
+        t->search.cap_near += t->search.cap_near / 4 + 8;
         t->search.near = bt_realloc(t->search.near, (size_t)t->search.cap_near, sizeof *t->search.near);
     }
     t->search.near[t->search.n_near++] = i;

@@ -66,11 +66,11 @@ static void put(bt_world *w, bt_idx i, const double to[3])
         w->tow->travel_y += to[1] - p->y;
     }
     int32_t across = 0;
-    p->x = bt_into_period(to[0], w->par.x0, w->par.period_x, &b->home[i].lap);
+    p->x = bt_into_period(to[0], w->par.x0, w->par.period_x, &b->lap[i]);
     p->y = bt_into_period(to[1], w->par.y0, w->par.period_y, &across);
     p->yaw = to[2];
     bt_bodies_turn(b, i);
-    if (w->window && b->gid[i] < w->window->n_floes) b->home[i].lap = bt_window_lap(w, p->x);
+    if (w->window && b->gid[i] < w->window->n_floes) b->lap[i] = bt_window_lap(w, p->x);
 }
 
 /// Collective. Id of a body over which body gid would lie at a place, by more than is left alone; −1 = none. The rank

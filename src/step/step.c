@@ -38,7 +38,7 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     bt_pose *p = &b->pose[i];
     if (dx != 0 || dy != 0) {
         int32_t across = 0;
-        p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);
+        p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->lap[i]);
         p->y = bt_into_period(p->y + dy, w->par.y0, w->par.period_y, &across);
     }
     if (turn != 0) {

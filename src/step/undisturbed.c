@@ -56,7 +56,7 @@ void bt_undisturbed_advance(bt_world *w)
 {
     bt_undisturbed *v = w->undisturbed;
     if (!v) return;
-    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
+    bt_pose nowhere = {NAN, NAN, NAN};
     const bt_bodies one = {
         .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
     bt_force_body mean = {

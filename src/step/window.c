@@ -47,12 +47,13 @@ void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes)
     v->stride = bt_min(BT_WINDOW_STRIDE * w->par.size, bt_min(0.25 * zone, length / 16));
     v->start = v->rear = body_at(w) + ahead - length;
     v->most = body_at(w);
+    bt_bodies_make_homes(b);
     for (bt_idx i = 0; i < b->n; i++) {
         const double x = b->pose[i].x;
         bt_home *h = &b->home[i];
         *h = (bt_home){.x = x, .y = b->pose[i].y, .yaw = b->pose[i].yaw};
         if (b->gid[i] >= n_floes) continue;
-        h->copy = h->lap = bt_window_lap(w, x);
+        h->copy = b->lap[i] = bt_window_lap(w, x);
     }
 }
 
@@ -77,7 +78,7 @@ static double home_at(const bt_world *w, bt_idx i)
 }
 static double floe_at(const bt_world *w, bt_idx i)
 {
-    const double x = w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length;
+    const double x = w->bodies.pose[i].x + w->bodies.lap[i] * w->window->length;
     return w->window->sign * (x - w->undisturbed->drift_x);
 }
 
@@ -96,7 +97,7 @@ static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
     const bt_window *v = w->window;
     const bt_home *h = &w->bodies.home[i];
     int32_t across = 0;
-    bt_pose p = {.yaw = h->yaw, .c = bt_cos(h->yaw), .s = bt_sin(h->yaw)};
+    bt_pose p = {.yaw = h->yaw};
     p.x = bt_into_period(h->x + w->undisturbed->drift_x, w->par.x0, v->length, turns);
     p.y = bt_into_period(h->y + w->undisturbed->drift_y, w->par.y0, w->par.period_y, &across);
     return p;
@@ -136,11 +137,13 @@ static candidate *collect(const bt_world *w, size_t *n, shapes *shape)
                 mine[m] = (candidate){.gid = b->gid[i], .place = p, .radius = b->radius[i], .mass = b->mass[i],
                                       .inertia = b->inertia[i], .was = b->vel[i], .n = count};
             m++;
+            double s, c;
+            bt_sincos(p.yaw, &s, &c);
             for (int64_t k = 0; pass && k < count; k++) {
                 const double *q = b->vertices + 2 * (b->offset[i] + k);
                 double *to = own.vertex + 2 * (n_vertices + (size_t)k);
-                to[0] = p.c * q[0] - p.s * q[1];
-                to[1] = p.s * q[0] + p.c * q[1];
+                to[0] = c * q[0] - s * q[1];
+                to[1] = s * q[0] + c * q[1];
                 own.mark[n_vertices + (size_t)k] = b->mark[b->offset[i] + k];
             }
             n_vertices += (size_t)count;
@@ -232,7 +235,7 @@ static void forget_contacts(bt_world *w, const uint8_t *moved)
         bt_cell *cell = &t->cell[k];
         for (bt_idx j = 0; j < cell->search.n_pairs; j++) {
             bt_pair *p = &cell->search.pairs[j];
-            if (moved[p->a] || moved[p->b]) p->n_points = 0;
+            if (moved[p->a] || moved[p->b]) p->contact = -1;
         }
         bt_idx kept = 0;
         for (bt_idx j = 0; j < cell->laws.n_memory; j++) {
@@ -251,7 +254,7 @@ static void put(bt_world *w, bt_idx i)
     int32_t turns = 0;
     b->pose[i] = place_of(w, i, &turns);
     h->copy += (int32_t)v->sign;
-    h->lap = turns + h->copy;
+    b->lap[i] = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = w->undisturbed->vel;
     b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
@@ -306,7 +309,7 @@ static void let_go(bt_world *w)
             if (own) bt_sum_add(&t.sum[MISSED], 1);
         }
         if (floe_at(w, i) < v->rear - v->zone) {
-            b->home[i].lap += (int32_t)v->sign;
+            b->lap[i] += (int32_t)v->sign;
             if (own) bt_sum_add(&t.sum[KEPT], 1);
         }
         if (own && floe_at(w, i) < v->rear) bt_sum_add(&t.sum[WAITING], 1);

@@ -87,7 +87,7 @@ uint64_t bt_world_hash(const bt_world *w)
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
-        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
+        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->lap[i]));
         sum += h;
     }
     for (bt_idx k = 0; k < w->cells->n; k++)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The line rows of a step and the vessel at their end; equations in tow/tow.h.
 #include "tow/tow_rows.h"
+#include "base/elementary.h"
 
 #include <math.h>
 
@@ -142,7 +143,8 @@ void bt_tow_begin_rows(bt_world *w)
 {
     bt_tow *t = w->tow;
     const bt_idx i = bt_world_towed(w);
-    const bt_pose *p = &w->bodies.pose[i];
+    double sine, cosine;
+    bt_sincos(w->bodies.pose[i].yaw, &sine, &cosine);
     const bt_inv inv = w->bodies.inv[i];
     const bt_vel *v = &w->bodies.vel[i];
     bt_branch *first = &t->branch[0], *second = &t->branch[1];
@@ -151,8 +153,8 @@ void bt_tow_begin_rows(bt_world *w)
     if (t->mode == BT_TOW_THRUST) free_end.d = bt_max(idle.d, bt_min(t->vessel.full, t->end_speed));
     for (int k = 0; k < t->n_branches; k++) {
         bt_branch *b = &t->branch[k];
-        b->rx = p->c * b->hull_x - p->s * b->hull_y;
-        b->ry = p->s * b->hull_x + p->c * b->hull_y;
+        b->rx = cosine * b->hull_x - sine * b->hull_y;
+        b->ry = sine * b->hull_x + cosine * b->hull_y;
         // The end stands where its path says, in the frame of the unwrapped body.
         const double x = t->travel_x + b->rx, y = t->travel_y + b->ry;
         const double dx = t->carriage_x - x, dy = t->carriage_y - y;

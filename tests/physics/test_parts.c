@@ -211,7 +211,7 @@ static void detect_equals_brute_force_with_parts(void **state)
             // must find the same.
             for (bt_idx k = 0; k < w->cells->n; k++)
                 for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++)
-                    w->cells->cell[k].search.pairs[j].n_points = 0;
+                    w->cells->cell[k].search.pairs[j].contact = -1;
             detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, have = 0;

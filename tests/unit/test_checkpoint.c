@@ -244,7 +244,7 @@ static int seen_in(const bt_world *w)
     if (w->cells->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (bt_part_first(&w->bodies, i) > 0) seen |= PARTS;
-        if (w->bodies.home[i].lap != 0) seen |= WRAPS;
+        if (w->bodies.lap[i] != 0) seen |= WRAPS;
     }
     for (bt_idx k = 0; k + 1 < w->cells->n; k++)
         if (w->cells->asleep[k] && w->cells->cell[k].end > w->cells->cell[k].first) seen |= RESTS;

@@ -109,7 +109,7 @@ static contact *contacts_of(const bt_world *w, bt_idx *n)
             assert_int_equal(bt_cells_of_pair(w, u->a, u->b), k);
             c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n,
                                   u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
-                                  t->search.pairs[t->contacts[j].pair].feature[0]};
+                                  t->gaps[j].feature[0]};
         }
     }
     assert_int_equal(*n, w->cells->n_contacts);
@@ -278,7 +278,6 @@ static void edge_contact_keeps_its_features(void **state)
         const bt_idx k = bt_cells_of_pair(w, 0, 1);
         bt_contact *u = &w->cells->cell[k].contacts[0];
         const bt_gaps *g = &w->cells->cell[k].gaps[0];
-        bt_pair *pair = &w->cells->cell[k].search.pairs[u->pair];
         assert_int_equal(u->n, 2);
         CHECK_CLOSE(u->nx, 1, 0.02);
         if (s == 0) {
@@ -287,12 +286,12 @@ static void edge_contact_keeps_its_features(void **state)
         } else {
             CHECK_CLOSE(u->ln[0], 100 + s - 1, 0);
             CHECK_CLOSE(u->lt, 7 + s - 1, 0);
-            assert_int_equal(pair->feature[0], features[0]);
-            assert_int_equal(pair->feature[1], features[1]);
+            assert_int_equal(g->feature[0], features[0]);
+            assert_int_equal(g->feature[1], features[1]);
         }
-        features[0] = pair->feature[0], features[1] = pair->feature[1];
-        pair->ln[0] = 100 + s; // must be handed on to the next step
-        pair->lt = 7 + s;
+        features[0] = g->feature[0], features[1] = g->feature[1];
+        u->ln[0] = 100 + s; // must be handed on to the next step
+        u->lt = 7 + s;
         w->bodies.pose[1].y += 0.002;
         w->bodies.pose[1].yaw = 2e-4 * (s % 2 ? 1 : -1); // the two edges take turns in being the better axis
         bt_bodies_turn(&w->bodies, 1);
