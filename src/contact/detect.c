@@ -23,9 +23,9 @@ static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, d
     for (int32_t y = y0 - 2; y <= y1 + 1; y++)
         for (int32_t x = x0 - 2; x <= x1 + 1; x++) {
             const bt_idx k = bt_cells_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
-            if (k < 0) continue;
+            if (k < 0 || !(s > t->bound[k])) continue; // a bound above 0 has woken it
             bt_cells_wake(t, k);
-            t->bound[k] = bt_max(t->bound[k], s);
+            t->bound[k] = s;
         }
 }
 
@@ -61,7 +61,9 @@ static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals 
     double s = 0;
     if (k == t->n - 1) return;
     for (bt_idx i = t->cell[k].first; i < t->cell[k].end && bt_cells_moves(t, k); i++) {
-        s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[0][i]), bt_bodies_speed(w, i, &v[1][i])));
+        // most floes of a cell that moves rest
+        if (!bt_bodies_drift(w, &v[0][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[0][i]));
+        if (v[1] != v[0] && !bt_bodies_drift(w, &v[1][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[1][i]));
         if (w->bodies.disturbed[i]) s = bt_max(s, stir);
     }
     t->speed[k] = s;
