@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Broad phase: the list of a cell's pairs near enough to be looked at, kept over many steps.
 //
-// Boxes of the bodies of the cell's block are compared all with all; a cell has some dozens, and comparing boxes that
-// lie in a row in memory is quicker than any finer grid. The list holds while no body of the block has travelled (path
-// of its fastest point) farther than its share of the clearance; then it is made anew. A large body that cannot be
-// moved (a wall, a berg at a set speed) pairs with the floes of the cell itself; one that can be moved has its pairs in
-// the last cell.
+// Boxes of the bodies of a cell are compared all with all, and with those of the cells beside it where both come near
+// the border; a cell has some dozens, and comparing boxes that lie in a row in memory is quicker than any finer grid.
+// The list holds while no body of the block has travelled (path of its fastest point) farther than its share of the
+// clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
+// floes of the cell itself; one that can be moved has its pairs in the last cell.
 //
 // Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
 // far towards each other, a step looks at these near ones alone.
@@ -119,7 +119,8 @@ static void box_about(const bt_params *p, const bt_pair_scratch *s, boxes r, dou
     box[HIGH_X] = box[HIGH_Y] = -INFINITY;
     for (size_t i = r.begin; i < r.end; i++) {
         const double *b = s->box + N_BOX * i;
-        const double dx = bt_nearest_image(b[X] - box[X], p->period_x), dy = bt_nearest_image(b[Y] - box[Y], p->period_y);
+        const double dx = bt_nearest_image(b[X] - box[X], p->period_x),
+                     dy = bt_nearest_image(b[Y] - box[Y], p->period_y);
         box[LOW_X] = bt_min(dx + b[LOW_X], box[LOW_X]); // passes over a NaN
         box[LOW_Y] = bt_min(dy + b[LOW_Y], box[LOW_Y]);
         box[HIGH_X] = bt_max(dx + b[HIGH_X], box[HIGH_X]);
