@@ -186,9 +186,3 @@ double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const 
                                                    dy).gap);
     return deepest;
 }
-
-double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v)
-{
-    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
-    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
-}

@@ -34,7 +34,17 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);
 void bt_bodies_turn(bt_bodies *b, bt_idx i);
 
 /// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
-double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v);
+static inline double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v)
+{
+    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
+    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
+}
+
+/// Is v the velocity of the water, to the last bit, without turning?
+static inline bool bt_bodies_drift(const bt_world *w, const bt_vel *v)
+{
+    return v->x == w->par.water_u && v->y == w->par.water_v && v->w == 0;
+}
 
 /// Depth to which body i overlaps with polygons, m; <= 0: it does not. They have n vertices, with their marks, and with
 /// their places relative to a centroid from which that of i is (dx, dy), m, as bt_bodies has them: an outline, with its

@@ -20,12 +20,19 @@
 /// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
-    for (int32_t y = y0 - 2; y <= y1 + 1; y++)
-        for (int32_t x = x0 - 2; x <= x1 + 1; x++) {
-            const bt_idx k = bt_cells_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
-            if (k < 0) continue;
+    const bool open = !t->wrap_x && !t->wrap_y; // then the box of the cells is all there is
+    x0 -= 2, x1 += 1, y0 -= 2, y1 += 1;
+    if (open) {
+        x0 = x0 > t->low_x ? x0 : t->low_x, x1 = x1 < t->low_x + t->n_x ? x1 : t->low_x + t->n_x - 1;
+        y0 = y0 > t->low_y ? y0 : t->low_y, y1 = y1 < t->low_y + t->n_y ? y1 : t->low_y + t->n_y - 1;
+    }
+    for (int32_t y = y0; y <= y1; y++)
+        for (int32_t x = x0; x <= x1; x++) {
+            const bt_idx k = open ? t->at[(int64_t)(y - t->low_y) * t->n_x + (x - t->low_x)]
+                                  : bt_cells_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
+            if (k < 0 || !(s > t->bound[k])) continue; // a bound above 0 has woken it
             bt_cells_wake(t, k);
-            t->bound[k] = bt_max(t->bound[k], s);
+            t->bound[k] = s;
         }
 }
 
@@ -60,8 +67,11 @@ static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals 
     const double stir = 0.5 * w->par.slop / w->par.dt;
     double s = 0;
     if (k == t->n - 1) return;
-    for (bt_idx i = t->cell[k].first; i < t->cell[k].end && bt_cells_moves(t, k); i++) {
-        s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[0][i]), bt_bodies_speed(w, i, &v[1][i])));
+    const bt_idx end = bt_cells_moves(t, k) ? t->cell[k].end : t->cell[k].first;
+    for (bt_idx i = t->cell[k].first; i < end; i++) {
+        // most floes of a cell that moves rest
+        if (!bt_bodies_drift(w, &v[0][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[0][i]));
+        if (v[1] != v[0] && !bt_bodies_drift(w, &v[1][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[1][i]));
         if (w->bodies.disturbed[i]) s = bt_max(s, stir);
     }
     t->speed[k] = s;

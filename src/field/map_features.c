@@ -3,6 +3,7 @@
 #include "field/map_features.h"
 
 #include <inttypes.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,9 +44,11 @@ static void skip_string(scan *s)
 /// A value, and the space behind it.
 static void skip_value(scan *s)
 {
+    static const bool marks[UCHAR_MAX + 1] = {['"'] = true, ['['] = true, [']'] = true, ['{'] = true, ['}'] = true};
     int64_t depth = 0;
     const char *begin = s->p;
     do {
+        while (depth > 0 && s->p < s->end && !marks[(unsigned char)*s->p]) s->p++; // what most of the text is
         const char c = peek(s);
         if (c == '"') {
             skip_string(s);
@@ -94,11 +97,22 @@ static bool nearest(uint64_t w, int k, double *x)
 {
     // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the
     // number itself. By strtod, reading a number of 17 digits takes twice the instructions.
-    uint64_t power = 1;
-    for (int i = 0; i < k; i++) power *= 10;
+    static const uint64_t powers[MOST_DIGITS + 1] = {
+        1u,         10u,         100u,         1000u,         10000u,         100000u,         1000000u,
+        10000000u,  100000000u,  1000000000u,  10000000000u,  100000000000u,  1000000000000u,  10000000000000u,
+        100000000000000u, 1000000000000000u, 10000000000000000u, 100000000000000000u, 1000000000000000000u,
+        10000000000000000000u};
+    const uint64_t power = powers[k];
     const bt_uint128 units = (bt_uint128)w << 64, q = units / power;
     *x = (double)(q | (q * power != units)) * 0x1p-64;
     return q >> 55 > 0;
+}
+
+/// The digits from p on, and *w with them behind its own: the first MOST_DIGITS are exact. Returns their end.
+static const char *take_digits(const char *p, const char *end, uint64_t *w)
+{
+    for (; p < end && *p >= '0' && *p <= '9'; p++) *w = 10 * *w + (uint64_t)(*p - '0');
+    return p;
 }
 
 /// A number as JSON has it [RFC 8259], of those that jansson takes for the same.
@@ -109,28 +123,29 @@ static bool take_number(scan *s, double *x)
     const char *p = s->p, *begin = p;
     if (p < s->end && *p == '-') p++;
     const char *digits = p;
-    while (p < s->end && *p >= '0' && *p <= '9') p++;
-    if (p == digits || (*digits == '0' && p > digits + 1)) return false;
-    bool whole = true;
-    for (const char *mark = ".e"; *mark; mark++) { // a fraction, an exponent
-        if (p == s->end || (*p | (*mark == 'e' ? 0x20 : 0)) != *mark) continue;
+    uint64_t w = 0, power = 0;
+    p = take_digits(p, s->end, &w);
+    ptrdiff_t places = p - digits, behind = 0; // behind the point
+    if (places == 0 || (*digits == '0' && places > 1)) return false;
+    bool whole = true, exponent = false;
+    if (p < s->end && *p == '.') {
+        const char *first = p + 1;
+        p = take_digits(first, s->end, &w);
+        behind = p - first, places += behind;
+        if (behind == 0) return false;
         whole = false;
+    }
+    if (p < s->end && (*p == 'e' || *p == 'E')) {
         p++;
-        if (*mark == 'e' && p < s->end && (*p == '+' || *p == '-')) p++;
+        if (p < s->end && (*p == '+' || *p == '-')) p++;
         const char *first = p;
-        while (p < s->end && *p >= '0' && *p <= '9') p++;
+        p = take_digits(p, s->end, &power);
         if (p == first) return false;
+        whole = false, exponent = true;
     }
     const size_t n = (size_t)(p - begin);
-    if (n > MOST || (whole && p - digits > DIGITS)) return false;
-    uint64_t w = 0;
-    int places = 0;
-    const char *point = NULL, *c = digits;
-    for (; c < p && *c != 'e' && *c != 'E' && places < MOST_DIGITS; c++) {
-        if (*c == '.') point = c;
-        else w = 10 * w + (uint64_t)(*c - '0'), places++;
-    }
-    if (c == p && nearest(w, point ? (int)(p - point - 1) : 0, x)) {
+    if (n > MOST || (whole && places > DIGITS)) return false;
+    if (!exponent && places <= MOST_DIGITS && nearest(w, (int)behind, x)) {
         if (digits > begin) *x = -*x;
     } else {
         memcpy(copy, begin, n);
@@ -281,7 +296,8 @@ bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
     if (status != BT_OK) return status;
     // What a hostile file could make of it is known before: a tree takes far more room than the text.
     int64_t lists = 0;
-    for (size_t i = 0; i < f->size; i++) lists += f->text[i] == '[';
+    const char *c = f->text, *end = f->text + f->size;
+    while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
     if (lists > BT_MOST_LISTS) {
         bt_errors_add(err,
                       "%s: holds %" PRId64

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "body/bodies.h"
 #include "force/added.h"
 #include "force/laws.h"
 #include "force/load.h"
@@ -43,9 +44,20 @@ __attribute__((always_inline)) static inline void predict(bt_world *w, bt_idx i,
     b->vel[i] = b->vel_free[i] = u;
 }
 
-static void predict_cell(bt_world *w, bt_idx k, const void *context, bt_totals *none)
+/// What predict() comes to for a body that drifts with the water where all forces let it: no load, and the velocity as
+/// it is, but for the sign of a zero, to which the gain of the slope adds 0.
+static void drift(bt_bodies *b, bt_idx i)
 {
-    (void)context, (void)none;
+    const bt_vel u = b->vel[i];
+    b->vel_start[i] = u;
+    b->vel[i] = b->vel_free[i] = (bt_vel){u.x + 0.0, u.y + 0.0, u.w, u.unused};
+    b->inv[i] = (bt_inv){1 / b->mass[i], 1 / b->inertia[i]};
+}
+
+/// rest: no listed law has anything to say to a body that drifts with the water, and none is added.
+static void predict_cell(bt_world *w, bt_idx k, const void *rest, bt_totals *none)
+{
+    (void)none;
     bt_bodies *b = &w->bodies;
     bt_cells *t = w->cells;
     if (t->asleep[k] == BT_ASLEEP) return;
@@ -53,6 +65,7 @@ static void predict_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_turning r = BT_TURNING_NONE;
     for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
         if (b->motion[i] != BT_DYNAMIC) b->vel_free[i] = b->vel[i];
+        else if (*(const bool *)rest && bt_bodies_drift(w, &b->vel[i])) drift(b, i);
         else if (added) predict(w, i, true, &r);
         else predict(w, i, false, &r);
     }
@@ -62,7 +75,8 @@ static void predict_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
 void bt_forces_predict(bt_world *w)
 {
     bt_totals none = {0};
-    bt_phases_busy(w, predict_cell, NULL, &none);
+    const bool rest = w->forces->n == BT_LISTED_LAWS && bt_forces_rest(w);
+    bt_phases_busy(w, predict_cell, &rest, &none);
 }
 
 void bt_forces_begin(bt_world *w)

@@ -36,13 +36,15 @@ static void observe_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     const bt_idx towed = bt_world_towed(w);
     const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
     const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
+    int64_t moving = 0, touching = 0;
     for (bt_idx i = cell->first; i < cell->end; i++) {
         if (b->motion[i] != BT_DYNAMIC || i == towed) continue;
         const bt_vel *v = &b->vel[i];
-        if (v->x * v->x + v->y * v->y > slow2) bt_sum_add(&t->sum[MOVING], 1);
+        moving += v->x * v->x + v->y * v->y > slow2;
         const double ux = v->x - b->vel_free[i].x, uy = v->y - b->vel_free[i].y;
         if (prescribed && (ux != 0 || uy != 0)) bt_sum_add(&t->sum[BUDGET], -(ux * dx + uy * dy) / b->inv[i].m);
     }
+    bt_sum_add(&t->sum[MOVING], (double)moving);
     if (towed < 0) return;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
@@ -58,12 +60,13 @@ static void observe_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
             bt_sum_add(&t->sum[ICE_Y], sign * jy);
             bt_sum_add(&t->sum[ICE_TURN],
                        sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
-            bt_sum_add(&t->sum[TOUCHING], (u->ln[0] > 0) + (u->ln[1] > 0));
+            touching += (u->ln[0] > 0) + (u->ln[1] > 0);
         } else if (prescribed) { // impulses that came from the other bodies of infinite mass
             const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
             if (sign != 0) bt_sum_add(&t->sum[BUDGET], sign * (jx * dx + jy * dy));
         }
     }
+    bt_sum_add(&t->sum[TOUCHING], (double)touching);
 }
 
 static bt_totals observe_cells(bt_world *w, double slow2)
@@ -203,7 +206,7 @@ static double sum_of_floes(const bt_world *w, const bt_quantity *q)
 /// What the rows of the series say themselves, by one thread: their functions need not know of threads.
 static void observe_rows(const bt_world *w, unsigned has, bt_sample *s)
 {
-    for (int k = 0; k < bt_n_series(); k++) {
+    for (int k = 0, n = bt_n_series(); k < n; k++) {
         const bt_quantity *q = bt_series(k);
         if (!(has & 1u << q->applies)) bt_sample_set(s, q, NAN); // alike on all ranks
         else if (q->of_floe) bt_sample_set(s, q, sum_of_floes(w, q));

@@ -258,9 +258,10 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     bt_history_add(&r->history, s);
     bt_impact_store_take(&r->impacts, s->time);
     for (int k = 0; k < r->n_series; k++) {
+        const bt_quantity *q = bt_series(k);
         double *m = &r->merged[k];
-        const double x = bt_sample_value(s, bt_series(k));
-        switch (r->n_merged ? bt_series(k)->keep : BT_KEEP_LAST) {
+        const double x = bt_sample_value(s, q);
+        switch (r->n_merged ? q->keep : BT_KEEP_LAST) {
         case BT_KEEP_LAST: *m = x; break;
         case BT_KEEP_MEAN:
         case BT_KEEP_SUM: *m += x; break;

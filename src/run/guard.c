@@ -135,6 +135,7 @@ static range range_of(const bt_guard *g, const bt_world *w)
 /// only where they stand.
 static bool beyond(const range *r, double x, double y)
 {
+    if (x >= r->low[0] && x <= r->high[0] && y >= r->low[1] && y <= r->high[1]) return false;
     const double out[2] = {bt_max(r->low[0] - x, x - r->high[0]), bt_max(r->low[1] - y, y - r->high[1])};
     for (int k = 0; k < 2; k++)
         if (r->wall[k] && out[k] > 0 && (!r->open[1 - k] || (out[1 - k] <= 0 && out[k] <= r->depth))) return true;

@@ -178,12 +178,15 @@ BT_FOR_EACH_CPU
 static void move_on_bodies(bt_vel *vel, bt_vel *before, bt_idx n, double beta)
 {
     _Static_assert(sizeof(bt_vel) == sizeof(bt_vec), "a velocity a vector");
+    if (!(beta > 0)) {
+        memcpy(before, vel, (size_t)n * sizeof *vel);
+        return;
+    }
     for (bt_idx i = 0; i < n; i++) {
         bt_vec now, last;
         memcpy(&now, &vel[i], sizeof now);
         memcpy(&last, &before[i], sizeof last);
         memcpy(&before[i], &now, sizeof now);
-        if (!(beta > 0)) continue;
         now = now + beta * (now - last);
         memcpy(&vel[i], &now, sizeof now);
     }

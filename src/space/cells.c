@@ -64,12 +64,10 @@ void bt_cells_free(bt_cells *t)
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
-static int32_t wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
-
 /// Lower of two adjacent coordinates, around a periodic direction of n cells.
 static int32_t lower(int32_t p, int32_t q, int32_t n)
 {
-    if (n > 1) return p == q || wrapped(p + 1, n) == q ? p : q;
+    if (n > 1) return p == q || bt_cells_wrapped(p + 1, n) == q ? p : q;
     return p < q ? p : q;
 }
 
@@ -77,17 +75,6 @@ void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], i
 {
     out[0] = lower(p[0], q[0], t->wrap_x);
     out[1] = lower(p[1], q[1], t->wrap_y);
-}
-
-bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y)
-{
-    if (t->wrap_x == 1 && x != 0) return -1;
-    if (t->wrap_y == 1 && y != 0) return -1;
-    if (t->wrap_x) x = wrapped(x, t->wrap_x);
-    if (t->wrap_y) y = wrapped(y, t->wrap_y);
-    x -= t->low_x, y -= t->low_y;
-    if (x < 0 || y < 0 || x >= t->n_x || y >= t->n_y) return -1;
-    return t->at[(int64_t)y * t->n_x + x];
 }
 
 // --- busy cells ------------------------------------------------------------------------------------------------------

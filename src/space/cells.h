@@ -248,8 +248,19 @@ void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], i
 /// Are cells p and q the same or side by side, around periods too?
 bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]);
 
+/// Coordinate c around a periodic direction of n cells.
+static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
+
 /// Index of the cell at (x, y), −1 = not here.
-bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y);
+static inline bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y)
+{
+    if ((t->wrap_x == 1 && x != 0) || (t->wrap_y == 1 && y != 0)) return -1;
+    if (t->wrap_x) x = bt_cells_wrapped(x, t->wrap_x);
+    if (t->wrap_y) y = bt_cells_wrapped(y, t->wrap_y);
+    x -= t->low_x, y -= t->low_y;
+    if (x < 0 || y < 0 || x >= t->n_x || y >= t->n_y) return -1;
+    return t->at[(int64_t)y * t->n_x + x];
+}
 
 /// May the bodies of cell k have another velocity, or pose, than by drifting with the water?
 static inline bool bt_cells_moves(const bt_cells *t, bt_idx k) { return !t->asleep[k] || t->awake[k]; }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Broad phase: the list of a cell's pairs near enough to be looked at, kept over many steps.
 //
-// Boxes of the bodies of the cell's block are compared all with all; a cell has some dozens, and comparing boxes that
-// lie in a row in memory is quicker than any finer grid. The list holds while no body of the block has travelled (path
-// of its fastest point) farther than its share of the clearance; then it is made anew. A large body that cannot be
-// moved (a wall, a berg at a set speed) pairs with the floes of the cell itself; one that can be moved has its pairs in
-// the last cell.
+// Boxes of the bodies of a cell are compared all with all, and with those of the cells beside it where both come near
+// the border; a cell has some dozens, and comparing boxes that lie in a row in memory is quicker than any finer grid.
+// The list holds while no body of the block has travelled (path of its fastest point) farther than its share of the
+// clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
+// floes of the cell itself; one that can be moved has its pairs in the last cell.
 //
 // Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
 // far towards each other, a step looks at these near ones alone.
@@ -107,11 +107,75 @@ static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t 
     return n;
 }
 
-static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, size_t j0, size_t j1, double clearance,
-                  size_t *n)
+/// Bodies [i0, i1) of the scratch.
+typedef struct { size_t begin, end; } boxes;
+
+/// Box about several boxes, and about the centroid of the first.
+static void box_about(const bt_params *p, const bt_pair_scratch *s, boxes r, double box[N_BOX])
 {
-    for (size_t i = i0; i < i1; i++)
-        for (size_t j = j0 == i0 ? i + 1 : j0; j < j1; j++)
+    const double *first = s->box + N_BOX * r.begin;
+    box[X] = first[X], box[Y] = first[Y];
+    box[LOW_X] = box[LOW_Y] = INFINITY;
+    box[HIGH_X] = box[HIGH_Y] = -INFINITY;
+    for (size_t i = r.begin; i < r.end; i++) {
+        const double *b = s->box + N_BOX * i;
+        const double dx = bt_nearest_image(b[X] - box[X], p->period_x),
+                     dy = bt_nearest_image(b[Y] - box[Y], p->period_y);
+        box[LOW_X] = bt_min(dx + b[LOW_X], box[LOW_X]); // passes over a NaN
+        box[LOW_Y] = bt_min(dy + b[LOW_Y], box[LOW_Y]);
+        box[HIGH_X] = bt_max(dx + b[HIGH_X], box[HIGH_X]);
+        box[HIGH_Y] = bt_max(dy + b[HIGH_Y], box[HIGH_Y]);
+    }
+}
+
+static void swap_boxes(bt_pair_scratch *s, size_t i, size_t j)
+{
+    const bt_idx body = s->body[i];
+    s->body[i] = s->body[j], s->body[j] = body;
+    for (int k = 0; k < N_BOX; k++) {
+        const double x = s->box[N_BOX * i + (size_t)k];
+        s->box[N_BOX * i + (size_t)k] = s->box[N_BOX * j + (size_t)k];
+        s->box[N_BOX * j + (size_t)k] = x;
+    }
+}
+
+/// Those of r whose boxes come within clearance of another box, which are put in front of the others.
+static boxes in_front(const bt_params *p, bt_pair_scratch *s, boxes r, const double *box, double clearance)
+{
+    size_t end = r.begin;
+    for (size_t i = r.begin; i < r.end; i++)
+        if (near(p, box, s->box + N_BOX * i, clearance)) swap_boxes(s, end++, i);
+    return (boxes){r.begin, end};
+}
+
+static void among(const bt_world *w, bt_pair_scratch *s, boxes r, double clearance, size_t *n)
+{
+    for (size_t i = r.begin; i < r.end; i++)
+        for (size_t j = i + 1; j < r.end; j++)
+            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
+                append(w, s, n, s->body[i], s->body[j], clearance);
+}
+
+/// Do bodies of cells side by side, at most three sides apart with what they stand outside, have one nearest image?
+static bool one_image(int32_t wrap) { return wrap == 0 || wrap >= 8; }
+
+/// Pairs of a body of one cell and one of the other. Few of either are near the border: first those are found that come
+/// near the box about all of the other cell, with some room for the rounding of that box.
+static void between(const bt_world *w, bt_pair_scratch *s, boxes p, boxes q, double clearance, size_t *n)
+{
+    const bt_cells *ts = w->cells;
+    if (p.begin == p.end || q.begin == q.end) return;
+    if (one_image(ts->wrap_x) && one_image(ts->wrap_y)) {
+        const double wide = clearance + 0.05 * w->par.size;
+        double box[N_BOX];
+        box_about(&w->par, s, p, box);
+        q = in_front(&w->par, s, q, box, wide);
+        if (q.begin == q.end) return;
+        box_about(&w->par, s, q, box);
+        p = in_front(&w->par, s, p, box, wide);
+    }
+    for (size_t i = p.begin; i < p.end; i++)
+        for (size_t j = q.begin; j < q.end; j++)
             if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
                 append(w, s, n, s->body[i], s->body[j], clearance);
 }
@@ -122,16 +186,19 @@ static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, doub
     const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
-    const size_t own = add_boxes(w, k, s, 0), right = add_boxes(w, t->right, s, own),
-                 above = add_boxes(w, t->above, s, right), diagonal = add_boxes(w, t->diagonal, s, above);
-    among(w, s, 0, own, 0, own, clearance, &n);
-    among(w, s, 0, own, own, diagonal, clearance, &n);
-    among(w, s, own, right, right, above, clearance, &n);
+    const boxes own = {0, add_boxes(w, k, s, 0)}, right = {own.end, add_boxes(w, t->right, s, own.end)},
+                above = {right.end, add_boxes(w, t->above, s, right.end)},
+                diagonal = {above.end, add_boxes(w, t->diagonal, s, above.end)};
+    among(w, s, own, clearance, &n);
+    between(w, s, own, right, clearance, &n);
+    between(w, s, own, above, clearance, &n);
+    between(w, s, own, diagonal, clearance, &n);
+    between(w, s, right, above, clearance, &n);
     for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
         if (b->motion[l] == BT_DYNAMIC) continue;
         double box[N_BOX];
         box_of(b, l, box);
-        for (size_t i = 0; i < own; i++)
+        for (size_t i = own.begin; i < own.end; i++)
             if (near(&w->par, box, s->box + N_BOX * i, clearance_large))
                 append(w, s, &n, l, s->body[i], clearance_large);
     }

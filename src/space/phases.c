@@ -100,7 +100,7 @@ typedef struct pass {
     const void *context;
     bt_vel *exchanged;
     bt_idx me, team; ///< number of the thread, and how many there are
-    bt_totals own;
+    bt_totals *own;  ///< what the thread adds up
 } pass;
 
 static void open_shares(bt_cells *t)
@@ -121,7 +121,7 @@ static void visit_stretch(pass *o, int stretch)
             if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) break;
             const bt_idx i = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
             if (i >= s->end) break;
-            o->visit(o->w, t->order[i], o->context, &o->own);
+            o->visit(o->w, t->order[i], o->context, o->own);
         }
     }
 }
@@ -156,29 +156,28 @@ static void run_stretches(pass *o)
     for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(o, s);
 }
 
-static void run_as_one(void run(pass *), pass o, bt_totals *t)
-{
-    run(&o);
-#pragma omp critical
-    bt_totals_merge(t, &o.own);
-}
-
 /// The pass on all threads. One thread goes without OpenMP: in libgomp a team of one and each of its barriers enter the
-/// kernel too, to wake nobody, which was a sixth of the time of a small run.
-static void run_on_team(void run(pass *), const pass *each, bt_totals *t)
+/// kernel too, to wake nobody, which was a sixth of the time of a small run. It adds to t itself: to clear, copy and
+/// merge totals of its own costs as much as a small cell.
+static void run_on_team(void run(pass *), pass *o, bt_totals *t)
 {
-    bt_cells *cells = each->w->cells;
+    bt_cells *cells = o->w->cells;
     open_shares(cells);
     if (cells->n_shares == 1) {
-        run_as_one(run, *each, t);
+        o->own = t;
+        run(o);
         return;
     }
 #pragma omp parallel num_threads(cells->n_shares)
     {
-        pass o = *each;
-        o.me = omp_get_thread_num();
-        o.team = omp_get_num_threads();
-        run_as_one(run, o, t);
+        bt_totals own = {.n_sums = t->n_sums};
+        pass mine = *o;
+        mine.me = omp_get_thread_num();
+        mine.team = omp_get_num_threads();
+        mine.own = &own;
+        run(&mine);
+#pragma omp critical
+        bt_totals_merge(t, &own);
     }
 }
 
@@ -200,15 +199,14 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
         run_plain(w, visit, context, exchanged, t);
         return;
     }
-    const pass each = {.w = w, .visit = visit, .context = context, .exchanged = exchanged, .team = 1,
-                       .own = {.n_sums = t->n_sums}};
-    run_on_team(run_phases, &each, t);
+    pass o = {.w = w, .visit = visit, .context = context, .exchanged = exchanged, .team = 1};
+    run_on_team(run_phases, &o, t);
 }
 
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
-    const pass each = {.w = w, .visit = visit, .context = context, .team = 1, .own = {.n_sums = t->n_sums}};
-    run_on_team(run_stretches, &each, t);
+    pass o = {.w = w, .visit = visit, .context = context, .team = 1};
+    run_on_team(run_stretches, &o, t);
 }
 
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)

@@ -35,6 +35,7 @@ static double move(bt_world *w, bt_idx i, bool shifted)
         x += d.x, y += d.y;
         b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;
     }
+    if (dx == 0 && dy == 0 && turn == 0 && w->cells->still) return 0; // most floes of a cell that moves
     bt_pose *p = &b->pose[i];
     if (dx != 0 || dy != 0) {
         int32_t across = 0;
