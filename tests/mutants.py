@@ -10,6 +10,7 @@ import pathlib
 import sys
 
 EDGES = "cli/test_edges.py::test_"
+MADE = "cli/test_made_good.py::test_"
 PUT = "cli/test_python_stepping.py::test_"
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
@@ -87,7 +88,9 @@ MUTANTS = {
     "src/field/lead.c": ([EDGES + "a_lead_leaves_the_concentration_of_the_region_as_it_is", "unit/test_lead"], [
         ("if (status == BT_OK && outside) {", "if (false) {", "floes outside the region count after a lead"),
     ]),
-    "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused"], [
+    "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused",
+                           EDGES + "floes_below_the_least_size_are_counted"], [
+        ("s.below += d < limit;", "s.below += d < 0.5 * limit;", "floes below the least size"),
         ("|| !(share > LEAST_SHARE)", "", "a law of which nothing is left"),
     ]),
     "src/run/study_values.c": ([EDGES + "a_range_of_angles_is_run_in_its_unit",
@@ -468,10 +471,22 @@ MUTANTS = {
         ("    if (v->held[1]) u.y = 0;", "", "walls do not hold the drift"),
         ("    v->vel = u;", "", "ice keeps the velocity of its start"),
     ]),
-    "src/output/stall.c": (["unit/test_limit",
+    "src/output/stall.c": (["unit/test_limit", MADE + "an_end_that_begins_within_the_hull_is_no_overtaking",
+                            MADE + "a_body_that_overtakes_its_towing_end_is_reported",
                             "cli/test_estimate.py::test_no_jam_is_reported_where_no_ice_holds_the_body"], [
         (" && s->pull > 0 && s->ice >= BT_STALL_HELD * s->pull", "", "a jam without ice"),
         ("s->asked = s->spent = s->ice = s->pull = 0;", "s->asked = s->spent = 0;", "impulses of all windows"),
+        ("if (!in || !s->outside) return;", "if (!in) return;", "an end that begins within the hull"),
+        ("if (s->inside == 0) s->inside_from", "s->inside_from", "when the end was overtaken"),
+    ]),
+    "src/case/case_tow.c": ([MADE + "a_programme_ends_with_the_run",
+                             MADE + "a_lead_is_left_where_the_body_cuts_its_corner",
+                             MADE + "a_body_on_a_line_is_held_against_walls_where_it_goes",
+                             MADE + "a_body_that_moves_as_its_programme_begins_is_not_jerked"], [
+        ("(i == 0 || p[2 * i] <= end)", "true", "points after the run"),
+        ("const double on = apart > t->far ? 1 - t->far / apart : 0;", "const double on = 1;",
+         "a body where its end is"),
+        ("bt_max(0, own) * (1 + 1e-9)", "0", "a body that moves already"),
     ]),
     "src/case/arch.c": (["unit/test_arch"], [
         ("fabs(k ? bt_cos(course) : bt_sin(course))", "fabs(k ? bt_sin(course) : bt_cos(course))",
@@ -480,10 +495,12 @@ MUTANTS = {
         ("if (!worst.key || narrower(&a, &worst)) worst = a;", "if (!worst.key) worst = a;", "the first pair decides"),
     ]),
     "src/output/summary.c": (["unit/test_summary", EDGES + "estimates_are_those_of_the_leg_in_the_window",
-                             EDGES + "the_ordered_speed_is_that_of_the_window"], [
+                             EDGES + "the_ordered_speed_is_that_of_the_window",
+                             MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"], [
+        ("in->ordered = speed - (along - ice[0]);", "in->ordered += ice[0] - water[0];", "the current of the run"),
         ("straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);", "",
          "width across the first leg"),
-        ("in->turns = turns;", "", "a turn in the window is held against estimates"),
+        ("in->turns = s->turns;", "", "a turn in the window is held against estimates"),
         ("straight.tow.speed = (to - from) / (s->end - s->start);", ";", "the largest speed of the programme"),
         ("    if (adrift) {", "    if (false) {", "estimates of a body that nothing tows"),
         ("in->along = ice[0], in->speed", "in->speed", "the speed ordered"),
@@ -557,7 +574,13 @@ MUTANTS = {
         ("else if (d->distributed) add(p, to, &memory[k], sizeof *memory);", "", "records are lost on the way"),
         ("for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;", "", "names of floes that have gone"),
     ]),
-    "src/output/steady.c": (["unit/test_stats", "unit/test_summary", "cli/test_verdict.py"], [
+    "src/output/steady.c": (["unit/test_stats", "unit/test_summary", MADE + "a_turn_takes_its_whole_arc",
+                             MADE + "a_tow_that_goes_astern_is_not_steady",
+                             MADE + "a_body_on_a_line_follows_for_some_lengths_of_it", "cli/test_verdict.py"], [
+        ("way += (vx[i] * ux + vy[i] * uy) * (t[i] - t[i - 1]);",
+         "way += fabs(vx[i] * ux + vy[i] * uy) * (t[i] - t[i - 1]);", "astern counts as on"),
+        ("arc = 0.5 * c->tow.turn_radius * turn;", "arc = 0;", "a corner that is its middle"),
+        ("if (!turned || s->turns || c->tow.mode", "if (true || c->tow.mode", "a heavy body that swings out"),
         ("h->column[BT_COL_TIME][i] < time", "h->column[BT_COL_TIME][i] <= time", "window a step late"),
         ("if (isnan(x[i])) return false;", "", "a mean over a line that has parted"),
         ("first = start > first ? start : first;", "first = start;", "the last series decides"),

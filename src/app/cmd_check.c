@@ -101,6 +101,10 @@ static void print_line(const bt_case *c)
            (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
            c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load,
            c->tow.line.breaking_load > 0 ? "" : " = never breaks");
+    if (c->tow.line.branches > 1)
+        printf("line, second branch  %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", c->tow.branch2.length,
+               c->tow.branch2.stiffness, c->tow.branch2.breaking_load > 0 ? "" : "none: ",
+               c->tow.branch2.breaking_load, c->tow.branch2.breaking_load > 0 ? "" : " = never breaks");
     printf("line, fastened       at (%.4g, %.4g) m", whole(c->tow.hull_x), whole(c->tow.hull_y));
     if (c->tow.line.branches > 1)
         printf(" and (%.4g, %.4g) m", whole(c->tow.branch2.hull_x), whole(c->tow.branch2.hull_y));
@@ -113,10 +117,14 @@ static void print_line(const bt_case *c)
            bt_case_line_period(c), bt_case_steepest_ramp(c), BT_RAMP_PERIODS,
            bt_case_start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
-    const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
-    printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: "
-           "%.4g N\n",
-           c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v, c->tow.vessel.bollard_pull * (1 - r * r));
+    // of a current that changes the mean over the run
+    double current[2];
+    bt_environment_mean(c, true, current);
+    const double through = c->tow.speed - current[0] * bt_cos(c->tow.direction) - current[1] * bt_sin(c->tow.direction),
+                 r = bt_min(bt_max(through, 0) / c->tow.vessel.free_speed, 1);
+    printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s "
+           "through the water: %.4g N\n",
+           c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, through, c->tow.vessel.bollard_pull * (1 - r * r));
 }
 
 static void print_outlines(const bt_outline_counts *o)

@@ -65,6 +65,23 @@ double bt_case_tow_last(const bt_case *c, double way);
 /// Time at which the tow has led along this way at the latest within the run, s.
 double bt_case_tow_time(const bt_case *c, double way);
 
+/// The planned way of the towed body: led along the path, or drawn on a line behind an end that is.
+struct bt_path;
+typedef struct bt_trail {
+    struct bt_path *path; ///< of the end; in mode speed of the body
+    double far;           ///< from the end to the point that trails behind it, m; 0 in mode speed
+    double x, y;          ///< that point, m
+    double beside[2];     ///< of the body's centroid from there, m
+} bt_trail;
+/// False where the way-points make no path. Release with bt_case_trail_end.
+bool bt_case_trail_begin(const bt_case *c, bt_trail *t);
+/// The centroid when the end has gone this way, m: on, in steps much shorter than the line, by which it is a tractrix.
+void bt_case_trail_to(bt_trail *t, double way, double at[2]);
+void bt_case_trail_end(bt_trail *t);
+
+/// How far a body that trails behind a line cuts the corners of the planned path, m.
+double bt_case_tow_cut(const bt_case *c);
+
 #define BT_TURN 1e-6 ///< rad; less is rounding
 /// Change of course at way-point k, from 0, either way, rad; 0 at the last.
 double bt_case_tow_turn(const bt_case *c, int k);
@@ -100,7 +117,6 @@ void bt_case_tow_check(const bt_check *k);
 /// Where the towing end starts. False when two branches are too short to meet.
 bool bt_case_tow_start(const bt_case *c, double at[2]);
 /// The planned path; caller frees. Without way-points straight on. False with the reason in why.
-struct bt_path;
 bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
 
 /// Distance from the body to the end of the domain ahead of the tow, m; where no body is in the domain, its length.

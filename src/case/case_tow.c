@@ -2,6 +2,7 @@
 // The tow of a case: defaults that follow from other keys, checks, and where its path leads.
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/path.h"
@@ -11,26 +12,32 @@
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
+enum { TIMES = 2000 };                 // of a run at which its planned track is looked at
 static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
 // ---- speed and way ----
 
-/// Largest speed of the programme and the time at which it is first reached.
-static void largest_speed(const bt_case *c, double *speed, double *time)
-{
-    const double *p = c->tow.programme;
-    *speed = -1, *time = 0;
-    for (int i = 0; i < c->tow.n_programme; i++)
-        if (p[2 * i + 1] > *speed) *speed = p[2 * i + 1], *time = i > 0 ? p[2 * i] : 0;
-}
-
 static bt_speed_law speed_law(const bt_case *c)
 {
     return (bt_speed_law){
         .speed = c->tow.speed, .ramp = c->tow.ramp, .programme = c->tow.programme, .n = c->tow.n_programme};
 }
+
+/// Largest speed of the programme up to a time, and the time at which it is first reached.
+static void largest_speed(const bt_case *c, double end, double *speed, double *time)
+{
+    const double *p = c->tow.programme;
+    *speed = -1, *time = 0;
+    for (int i = 0; i < c->tow.n_programme && (i == 0 || p[2 * i] <= end); i++)
+        if (p[2 * i + 1] > *speed) *speed = p[2 * i + 1], *time = i > 0 ? p[2 * i] : 0;
+    const bt_speed_law l = speed_law(c);
+    if (isfinite(end) && bt_speed_law_at(&l, end) > *speed) *speed = bt_speed_law_at(&l, end), *time = end;
+}
+
+/// Until when a programme is followed: points after the end of the run are none of the tow.
+static double programme_end(const bt_case *c) { return c->run.duration > 0 ? c->run.duration : INFINITY; }
 
 double bt_case_tow_distance(const bt_case *c, double t)
 {
@@ -125,6 +132,60 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
     return made;
 }
 
+bool bt_case_trail_begin(const bt_case *c, bt_trail *t)
+{
+    char why[200];
+    double start[2], tangent[2];
+    *t = (bt_trail){.path = bt_alloc(1, sizeof *t->path)};
+    if (!bt_case_tow_path(c, t->path, why)) {
+        bt_case_trail_end(t);
+        return false;
+    }
+    bt_path_at(t->path, 0, start, tangent);
+    t->far = (start[0] - c->body.x) * tangent[0] + (start[1] - c->body.y) * tangent[1];
+    t->x = start[0] - t->far * tangent[0], t->y = start[1] - t->far * tangent[1];
+    t->beside[0] = c->body.x - t->x, t->beside[1] = c->body.y - t->y;
+    return true;
+}
+
+void bt_case_trail_to(bt_trail *t, double way, double at[2])
+{
+    double end[2], tangent[2];
+    bt_path_at(t->path, way, end, tangent);
+    const double dx = end[0] - t->x, dy = end[1] - t->y, apart = bt_hypot(dx, dy);
+    const double on = apart > t->far ? 1 - t->far / apart : 0;
+    t->x += on * dx, t->y += on * dy;
+    at[0] = t->x + t->beside[0], at[1] = t->y + t->beside[1];
+}
+
+void bt_case_trail_end(bt_trail *t)
+{
+    bt_path_free(t->path);
+    free(t->path);
+    *t = (bt_trail){0};
+}
+
+double bt_case_tow_cut(const bt_case *c)
+{
+    bt_trail t;
+    if (c->tow.n_waypoints == 0 || !has_line(c) || !bt_case_trail_begin(c, &t)) return 0;
+    enum { BEHIND = 100 }; // points of the path, to two lines' lengths behind the end: the body is beside one of these
+    double at[2], beside[2], tangent[2], most = 0;
+    const double whole = bt_case_tow_distance(c, c->run.duration);
+    for (int i = 1; i <= TIMES; i++) {
+        const double way = whole * i / TIMES;
+        bt_case_trail_to(&t, way, at);
+        double least = INFINITY;
+        for (int k = 0; k < BEHIND && i % 4 == 0; k++) {
+            bt_path_at(t.path, way - 2 * t.far * k / BEHIND, beside, tangent);
+            least = bt_min(least, bt_hypot(beside[0] - t.x, beside[1] - t.y));
+        }
+        if (isfinite(least)) most = bt_max(most, least);
+    }
+    bt_case_trail_end(&t);
+    return most;
+}
+
 // ---- defaults ----
 
 void bt_case_tow_course(const bt_check *k)
@@ -140,7 +201,7 @@ void bt_case_tow_follow(const bt_check *k)
     bt_case *c = k->c;
     if (c->tow.n_programme > 0) {
         double speed, time;
-        largest_speed(c, &speed, &time);
+        largest_speed(c, programme_end(c), &speed, &time);
         if (!bt_check_given(k, "tow.speed")) c->tow.speed = speed;
         if (!bt_check_given(k, "tow.ramp")) c->tow.ramp = time;
     }
@@ -175,7 +236,8 @@ double bt_case_steepest_ramp(const bt_case *c)
 {
     const double *p = c->tow.programme;
     if (c->tow.n_programme == 0) return c->tow.ramp;
-    double least = p[1] > 0 ? 0 : INFINITY;
+    const double own = c->body.vx * bt_cos(c->tow.direction) + c->body.vy * bt_sin(c->tow.direction);
+    double least = p[1] > bt_max(0, own) * (1 + 1e-9) ? 0 : INFINITY;
     for (int i = 0; i + 1 < c->tow.n_programme; i++)
         if (p[2 * i + 3] > p[2 * i + 1])
             least = bt_min(least, (p[2 * i + 2] - p[2 * i]) * c->tow.speed / (p[2 * i + 3] - p[2 * i + 1]));
@@ -213,9 +275,40 @@ static void warn_of_jerks(const bt_case *c, bt_errors *warnings)
     bt_path_free(&path);
 }
 
+/// Largest speed of the current along the tow, m/s; over all legs of it.
+static double following(const bt_case *c)
+{
+    double most = 0;
+    for (int k = 0; k == 0 || k < c->tow.n_waypoints; k++) {
+        const double *p = c->tow.waypoints + 2 * k,
+                     course = k > 0 ? bt_atan2(p[1] - p[-1], p[0] - p[-2]) : c->tow.direction,
+                     ux = bt_cos(course), uy = bt_sin(course);
+        if (c->water.table.n == 0)
+            most = bt_max(most, c->water.current_x * ux + c->water.current_y * uy + c->water.tide.major);
+        for (int64_t i = 0; i < c->water.table.n; i++)
+            most = bt_max(most, c->water.table.row[3 * i + 1] * ux + c->water.table.row[3 * i + 2] * uy +
+                                    c->water.tide.major);
+    }
+    return most;
+}
+
+/// A body that comes on faster than its towing end, which a line does not hinder.
+static void warn_of_overtaking(const bt_case *c, bt_errors *warnings)
+{
+    const double along = has_line(c) ? following(c) : 0;
+    if (along > c->tow.speed && c->tow.speed > 0)
+        bt_errors_add(warnings,
+                      "water.%s: up to %.3g m/s along the tow, which is to make %.3g m/s: the current carries the body "
+                      "past its towing end, and nothing in the model fends it off; tow faster than the current, or "
+                      "against it",
+                      c->water.table.n ? "current_table" : c->water.tide.major > 0 ? "tide" : "current_x", along,
+                      c->tow.speed);
+}
+
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
     if (c->tow.mode == BT_TOW_SPEED) warn_of_jerks(c, warnings);
+    warn_of_overtaking(c, warnings);
     if (bt_case_start_is_slow(c)) return;
     const double period = bt_case_line_period(c), ramp = bt_case_steepest_ramp(c);
     if (c->tow.n_programme > 0)
@@ -282,13 +375,14 @@ static void check_programme(const bt_check *k)
                            p[2 * i + 2], p[2 * i]);
             return;
         }
-    double speed, time;
-    largest_speed(c, &speed, &time);
-    if (bt_check_sound(k, "tow.speed") && c->tow.speed != speed)
+    double speed, time, whole, last; // resolved cases of before have those of the whole programme
+    largest_speed(c, programme_end(c), &speed, &time);
+    largest_speed(c, INFINITY, &whole, &last);
+    if (bt_check_sound(k, "tow.speed") && c->tow.speed != speed && c->tow.speed != whole)
         bt_check_fault(k, "tow.speed",
                        "%g m/s has no effect with tow.programme, whose largest speed is %g m/s; remove one of them",
                        c->tow.speed, speed);
-    if (bt_check_sound(k, "tow.ramp") && c->tow.ramp != time)
+    if (bt_check_sound(k, "tow.ramp") && c->tow.ramp != time && c->tow.ramp != last)
         bt_check_fault(
             k, "tow.ramp",
             "%g s has no effect with tow.programme, which reaches its largest speed at %g s; remove one of them",
@@ -367,27 +461,29 @@ static void check_vessel(const bt_check *k)
                        c->tow.vessel.free_resistance, c->tow.vessel.bollard_pull);
 }
 
-/// First time at which the body, led along the path, leaves the walls; negative = never. At 2000 times of the run.
-static double time_of_wall(const bt_case *c, const bt_path *path)
+/// First time at which the body, led along the path or trailing behind what is, leaves the walls; negative = never. At
+/// TIMES times of the run.
+static double time_of_wall(const bt_case *c)
 {
-    enum { TIMES = 2000 };
-    double v[2 * BT_MAX_VERTICES], start[2], at[2], tangent[2];
+    double v[2 * BT_MAX_VERTICES], at[2], found = -1;
+    bt_trail t;
+    if (!bt_case_trail_begin(c, &t)) return -1;
     const int n = bt_case_waterline(c, v);
     const double cy = bt_cos(c->body.yaw), sy = bt_sin(c->body.yaw);
     const double slack = 1e-9 * (c->domain.length + c->domain.width);
-    bt_path_at(path, 0, start, tangent);
-    for (int i = 1; i <= TIMES; i++) {
+    for (int i = 1; i <= TIMES && found < 0; i++) {
         const double time = c->run.duration * i / TIMES;
         const double close_x = c->domain.ends_closing * time - slack, close_y = c->domain.sides_closing * time - slack;
-        bt_path_at(path, bt_case_tow_led(c, time), at, tangent);
+        bt_case_trail_to(&t, bt_case_tow_led(c, time), at);
         for (int j = 0; j < n; j++) {
-            const double x = c->body.x + at[0] - start[0] + cy * v[2 * j] - sy * v[2 * j + 1] - c->domain.x0;
-            const double y = c->body.y + at[1] - start[1] + sy * v[2 * j] + cy * v[2 * j + 1] - c->domain.y0;
-            if (c->domain.ends == BT_BOUND_WALL && (x < close_x || x > c->domain.length - close_x)) return time;
-            if (c->domain.sides == BT_BOUND_WALL && (y < close_y || y > c->domain.width - close_y)) return time;
+            const double x = at[0] + cy * v[2 * j] - sy * v[2 * j + 1] - c->domain.x0;
+            const double y = at[1] + sy * v[2 * j] + cy * v[2 * j + 1] - c->domain.y0;
+            if (c->domain.ends == BT_BOUND_WALL && (x < close_x || x > c->domain.length - close_x)) found = time;
+            if (c->domain.sides == BT_BOUND_WALL && (y < close_y || y > c->domain.width - close_y)) found = time;
         }
     }
-    return -1;
+    bt_case_trail_end(&t);
+    return found;
 }
 
 static void check_waypoints(const bt_check *k)
@@ -444,7 +540,7 @@ static void check_waypoints(const bt_check *k)
     if (c->tow.mode != BT_TOW_THRUST && c->run.duration > 0 && c->body.shape != BT_BODY_ABSENT &&
         bt_check_sound(k, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 "
                           "domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing body.shape")) {
-        const double time = time_of_wall(c, &path);
+        const double time = time_of_wall(c);
         if (time >= 0)
             bt_check_fault(k, "run.duration",
                            "the way-points lead the body into a wall after %.4g m; shorten the run to %g s, or move "

@@ -37,6 +37,8 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_LEEWAY_WATER, "leeway_through_water", leeway_through_water),
     COLUMN(BT_COL_IN_ICE_X, "body_in_ice_x", body_in_ice_x),
     COLUMN(BT_COL_IN_ICE_Y, "body_in_ice_y", body_in_ice_y),
+    COLUMN(BT_COL_VX, "body_vx", body_vx),
+    COLUMN(BT_COL_VY, "body_vy", body_vy),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)

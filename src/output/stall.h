@@ -6,6 +6,9 @@
 // the pull or more: a body that a weak vessel only sets going, or that a current holds, is in no jam. Nor is one whose
 // last line has parted. Why a path and not a time: one floe size is what a jam must yield to release, at any scale and
 // speed; a body that waits for its line to be hauled taut moves again sooner.
+//
+// And has it overtaken its towing end? Nothing in the model keeps a vessel off the hull: the end then goes through it,
+// and the line pulls from behind.
 #ifndef BERGTOW_STALL_H
 #define BERGTOW_STALL_H
 
@@ -22,6 +25,9 @@ typedef struct bt_stall {
     double from_x, from_y;  ///< where the body was, m
     double ice, pull;       ///< impulse of the ice against the tow, and of the tow, N s
     bool begun;
+    // the towing end within the hull, after it has been outside
+    double inside, inside_from; ///< s; s, when first; of no meaning where the first is 0
+    bool outside;               ///< it has been outside
 } bt_stall;
 
 struct bt_world;

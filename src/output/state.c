@@ -96,6 +96,8 @@ static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time),
                                           STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun)};
 /// Not in checkpoints of before, which have 0 for the window under way.
 static const bt_state_row held_rows[] = {STALL(F64, ice), STALL(F64, pull)};
+/// Nor these.
+static const bt_state_row inside_rows[] = {STALL(F64, inside), STALL(F64, inside_from), STALL(U8, outside)};
 
 #define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
 static const bt_state_row lead_rows[] = {
@@ -150,11 +152,13 @@ void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
     bt_snapshot_add_rows(s, "stall", held_rows, N_OF(held_rows), t);
+    bt_snapshot_add_rows(s, "stall", inside_rows, N_OF(inside_rows), t);
 }
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
     if (bt_snapshot_find(s, "stall/ice")) bt_snapshot_take_rows(s, "stall", held_rows, N_OF(held_rows), t);
+    if (bt_snapshot_find(s, "stall/inside")) bt_snapshot_take_rows(s, "stall", inside_rows, N_OF(inside_rows), t);
 }
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
 {

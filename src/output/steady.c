@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geometry/path.h"
 #include "step/window.h"
 #include "case/case_check.h"
 #include "case/track.h"
@@ -141,11 +142,81 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
                s->residual, BT_STEADY_RESIDUAL, speed);
 }
 
-/// When the body is where its towing end was at this time, by the planned speed: a body on a line turns until then.
-static double followed(const bt_case *c, double time)
+/// Way of the towing end after this time, m. A vessel need not keep to its programme: it goes as far as its body.
+static double led_after(const bt_history *h, const bt_case *c, double time)
 {
-    if (c->tow.mode == BT_TOW_SPEED) return time;
-    return bt_case_tow_time(c, bt_case_tow_distance(c, time) + c->tow.line_length);
+    const double *t = h->column[BT_COL_TIME], *vx = h->column[BT_COL_VX], *vy = h->column[BT_COL_VY];
+    double way = 0;
+    if (c->tow.mode != BT_TOW_THRUST || h->n == 0 || isnan(vx[0])) return bt_case_tow_distance(c, time);
+    for (int64_t i = 0; i < h->n && t[i] <= time; i++) way += bt_hypot(vx[i], vy[i]) * (t[i] - (i > 0 ? t[i - 1] : 0));
+    return way;
+}
+
+#define COURSE_LEFT 0.1 // rad of a turn that is left where the body counts as being on its new course, assumed
+
+/// Way of the end from a turn until the body on its line has followed, m. The angle θ between body and end goes down as
+/// tan θ/2 ~ exp(−s/L) (a tractrix); a line's length at least.
+static double followed_in(const bt_case *c, double turn)
+{
+    if (c->tow.mode == BT_TOW_SPEED) return 0;
+    return c->tow.line_length * bt_max(1, bt_log(tan(0.5 * bt_min(turn, 3)) / tan(0.5 * COURSE_LEFT)));
+}
+
+/// When way-point k was passed, s; NaN = not yet.
+static double passed_at(const bt_run_totals *t, int k)
+{
+    for (int64_t i = 0; t->events && i < t->events->n; i++)
+        if (t->events->event[i].kind == BT_EVENT_WAYPOINT && t->events->event[i].subject - 1 == k)
+            return t->events->event[i].time;
+    return NAN;
+}
+
+/// Angle between the mean courses of the body in the first and the last tenth of the window, rad: a heavy body swings
+/// out and comes on to its new course later than its line leads it there.
+static double swing(const bt_steady *s, const bt_history *h)
+{
+    const int64_t n = (s->n + 9) / 10;
+    double v[2][2] = {{0}};
+    for (int64_t i = 0; i < n; i++)
+        for (int k = 0; k < 2; k++) {
+            const int64_t at = k ? h->n - 1 - i : s->first + i;
+            v[k][0] += h->column[BT_COL_VX][at], v[k][1] += h->column[BT_COL_VY][at];
+        }
+    return fabs(bt_atan2(v[0][0] * v[1][1] - v[0][1] * v[1][0], v[0][0] * v[1][0] + v[0][1] * v[1][1]));
+}
+
+/// Turns at way-points, by the way of the end: from the beginning of the arc until the body has followed.
+static void judge_course(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
+{
+    bt_path path;
+    char why[200];
+    for (int k = 0; k < 2; k++) s->led[k] = led_after(h, c, k ? s->end : s->start);
+    if (c->tow.n_waypoints == 0 || c->tow.mode == BT_TOW_NONE || !bt_case_tow_path(c, &path, why)) return;
+    bool turned = false;
+    for (int k = 0; k < path.n_marks; k++) {
+        const double turn = bt_case_tow_turn(c, k), passed = passed_at(t, k), arc = 0.5 * c->tow.turn_radius * turn;
+        const bool vessel = c->tow.mode == BT_TOW_THRUST && isfinite(passed);
+        const double mark = vessel ? led_after(h, c, passed) : path.mark[k], slack = 1e-9 * mark;
+        turned = turned || (turn > BT_TURN && mark < s->led[1]);
+        if (!(turn > BT_TURN) || mark - arc >= s->led[1] - slack ||
+            mark + arc + followed_in(c, turn) <= s->led[0] + slack)
+            continue;
+        char when[60] = "that it begins to turn to";
+        if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
+        decide(s, BT_NOT_STEADY,
+               "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run before, begin the "
+               "window later, or read the series",
+               turn * 180 / BT_PI, k + 1, when,
+               mark + arc > s->led[0] + slack ? "" : " for the body, which follows its line");
+        s->turns = true;
+    }
+    bt_path_free(&path);
+    if (!turned || s->turns || c->tow.mode == BT_TOW_SPEED || !(swing(s, h) > COURSE_LEFT)) return;
+    decide(s, BT_NOT_STEADY,
+           "the course of the body, behind its line, still changes by %.3g deg within the window: begin it later, or "
+           "read the series",
+           swing(s, h) * 180 / BT_PI);
+    s->turns = true;
 }
 
 /// What happened within the window that no mean goes across.
@@ -163,13 +234,6 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
         const bt_event *e = &t->events->event[i];
         if (e->kind == BT_EVENT_ADRIFT)
             decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
-        else if (e->kind == BT_EVENT_WAYPOINT && e->time < s->end && followed(c, e->time) > s->start &&
-                 bt_case_tow_turn(c, (int)e->subject - 1) > BT_TURN)
-            decide(s, BT_NOT_STEADY,
-                   "the course changes by %.3g deg at way-point %d, passed at %g s, within the window%s: end the run "
-                   "before, or read the series",
-                   bt_case_tow_turn(c, (int)e->subject - 1) * 180 / BT_PI, (int)e->subject, e->time,
-                   e->time > s->start ? "" : " for the body, a line's length behind");
         else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
             decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after",
                    e->time);
@@ -184,6 +248,23 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
                100 * (double)t->window->missed / places);
 }
 
+/// Way that the body has come on over ground within the window, along the leg of the tow that it is on, m; NaN = not
+/// known.
+static double come_on(const bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
+{
+    const double *t = h->column[BT_COL_TIME], *vx = h->column[BT_COL_VX], *vy = h->column[BT_COL_VY];
+    double way = 0, ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
+    int leg = 0;
+    for (int64_t i = s->first + 1; i < h->n; i++) {
+        for (; leg + 1 < c->tow.n_waypoints && passed_at(totals, leg) <= t[i]; leg++) {
+            const double *p = c->tow.waypoints + 2 * leg, course = bt_atan2(p[3] - p[1], p[2] - p[0]);
+            ux = bt_cos(course), uy = bt_sin(course);
+        }
+        way += (vx[i] * ux + vy[i] * uy) * (t[i] - t[i - 1]);
+    }
+    return way;
+}
+
 /// Ice that the body has opened itself, water beyond the ice, or a body that does not come on.
 static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
 {
@@ -195,18 +276,22 @@ static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, con
     bt_errors_free(&found);
     const double asked =
         c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, s->end) - bt_case_tow_distance(c, s->start);
-    double way = 0;
-    for (int64_t i = s->first + 1; i < h->n; i++) way += bt_hypot(x[i] - x[i - 1], y[i] - y[i - 1]);
+    const double way = come_on(s, h, c, totals);
+    if (totals->stall.inside > 0)
+        decide(s, BT_NOT_STEADY,
+               "the towing end was within the hull for %.3g s, from %.4g s on: the body has overtaken it, and its line "
+               "pulls from behind",
+               totals->stall.inside, totals->stall.inside_from);
     if (totals->stall.time > BT_STEADY_STALLED * s->end)
         decide(s, BT_NOT_STEADY,
                "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
                "jams",
                totals->stall.time, s->end);
-    else if (way < BT_STALL_SHARE * asked)
+    else if (way < BT_STALL_SHARE * asked && !s->turns) // else the body may be on the leg before
         decide(s, BT_NOT_STEADY,
-               "the tow asked for %.4g m within the window, %g to %g s, and the body has gone %.3g m through ice or "
-               "water: it does not come on",
-               asked, s->start, s->end, way);
+               "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
+               "does not come on",
+               asked, s->start, s->end, way < 0 ? "gone astern by" : "come on by", fabs(way));
 }
 
 /// The first of the reported series with a trend that matters: the others mostly follow from it.
@@ -261,7 +346,9 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     s->n = h->n - s->first;
     if (s->n == 0) {
         decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
-               s->earliest, h->n ? time[h->n - 1] : 0, s->given ? "lower output.window_start" : "shorten tow.ramp");
+               s->earliest, h->n ? time[h->n - 1] : 0, s->given                  ? "lower output.window_start"
+               : c->tow.n_programme > 0 ? "let tow.programme come to its largest speed earlier"
+                                        : "shorten tow.ramp");
     } else {
         s->start = time[s->first];
         s->end = time[h->n - 1];
@@ -274,10 +361,13 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
                "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
     if (s->start < ramp * (1 - 1e-12))
         decide(s, BT_NOT_STEADY,
-               "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start",
-               s->start, ramp);
+               "the window begins at %g s, before the %s at %g s: raise output.window_start",
+               s->start, c->tow.n_programme > 0 ? "tow comes to the largest speed of its programme"
+                                                : "ramp of the tow ends",
+               ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
+    judge_course(s, h, c, t);
     judge_track(s, h, c, t);
     judge_trends(s);
     judge_contact(s, h, t);

@@ -66,6 +66,8 @@ typedef struct bt_steady {
     bool given;                   ///< by output.window_start, not found
     int64_t first, n;             ///< steps
     int64_t put_off;              ///< steps from the earliest possible start to the first
+    double led[2];                ///< way of the towing end at start and end, m (bt_path_at); mode speed: of the body
+    bool turns;                   ///< the course of the tow changes within the window, or that of the body behind it
     bt_reported series[BT_N_REPORTED];
 } bt_steady;
 

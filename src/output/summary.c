@@ -186,6 +186,12 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
         if (doubt) bt_errors_add(&s->warnings, "%s", doubt);
         free(doubt);
     }
+    if (t->stall.inside > 0)
+        bt_errors_add(&s->warnings,
+                      "the towing end was within the hull for %.3g s, from %.4g s on: a following current, a tow that "
+                      "slows down or a sharp turn let the body overtake it; nothing in the model keeps them apart, and "
+                      "the line pulls from behind afterwards",
+                      t->stall.inside, t->stall.inside_from);
     if (t->stall.windows)
         bt_errors_add(
             &s->warnings,
@@ -224,36 +230,40 @@ static void without_tow(bt_summary *s, const bt_case *c)
 }
 
 /// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
-/// on the course there. *in says when that turns within the window.
-static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input *in)
+/// on the course there. *in says when that turns within the window, for the body too. tow: velocity ordered over
+/// ground, m/s.
+static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input *in, double tow[2])
 {
     bt_case straight = *c; // texts and tables remain those of c
     bt_path path = {0};
     char why[200];
-    bool turns = false;
     if (c->tow.mode != BT_TOW_NONE && s->end > s->start) {
         const double from = bt_case_tow_distance(c, s->start), to = bt_case_tow_distance(c, s->end);
         if (c->tow.n_programme > 0 || s->start < c->tow.ramp)
             straight.tow.speed = (to - from) / (s->end - s->start);
         if (c->tow.n_waypoints > 0 && bt_case_tow_path(c, &path, why)) {
             double a[2], b[2], first[2], last[2];
-            bt_path_at(&path, from, a, first);
-            bt_path_at(&path, to, b, last);
+            bt_path_at(&path, s->led[0], a, first);
+            bt_path_at(&path, s->led[1], b, last);
             straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);
             // at a set speed a body keeps its yaw; on a line it follows its course, as in src/case/arch.c
             if (c->tow.mode != BT_TOW_SPEED) straight.body.yaw += straight.tow.direction - c->tow.direction;
-            turns = fabs(first[0] * last[1] - first[1] * last[0]) > BT_TURN;
             bt_path_free(&path);
         }
     }
     bt_estimate_conditions(&straight, in);
-    in->turns = turns;
+    in->turns = s->turns;
+    tow[0] = straight.tow.speed * bt_cos(straight.tow.direction);
+    tow[1] = straight.tow.speed * bt_sin(straight.tow.direction);
 }
 
-/// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift.
-static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_totals *t)
+/// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift. tow: as
+/// ordered over ground, m/s.
+static void measure_speeds(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                           const double tow[2])
 {
     bt_estimate_input *in = &s->estimate;
+    const bool changes = c->water.tide.major > 0 || c->water.table.n > 0; // the current
     const double ice[2] = {mean_over(s, h, BT_COL_SPEED_ICE).mean, mean_over(s, h, BT_COL_LEEWAY_ICE).mean},
                  water[2] = {mean_over(s, h, BT_COL_SPEED_WATER).mean, mean_over(s, h, BT_COL_LEEWAY_WATER).mean};
     bool adrift = false;
@@ -261,7 +271,13 @@ static void measure_speeds(bt_summary *s, const bt_history *h, const bt_run_tota
     if (adrift) {
         in->speed = in->along = in->water_speed = in->water_along = NAN;
     } else if (isfinite(ice[0]) && !isnan(in->along)) {
-        in->ordered += ice[0] - water[0]; // less the drift of the ice past the water, as it was
+        // Less the drift of the ice over ground within the window: that of a current that changes is not the mean of
+        // the run.
+        const double speed = bt_hypot(tow[0], tow[1]), made[2] = {mean_over(s, h, BT_COL_VX).mean,
+                                                                  mean_over(s, h, BT_COL_VY).mean};
+        const double along = (made[0] * tow[0] + made[1] * tow[1]) / speed;
+        if (isfinite(along) && changes && !s->window.turns) in->ordered = speed - (along - ice[0]);
+        else in->ordered += ice[0] - water[0];
         in->along = ice[0], in->speed = bt_hypot(ice[0], ice[1]);
         in->water_along = water[0], in->water_speed = bt_hypot(water[0], water[1]);
     }
@@ -289,8 +305,9 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         without_tow(s, c);
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
-        order_window(c, &s->window, &s->estimate);
-        measure_speeds(s, h, t);
+        double tow[2];
+        order_window(c, &s->window, &s->estimate, tow);
+        measure_speeds(s, h, c, t, tow);
         s->estimate.concentration = t->concentration;
         if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
         if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;

@@ -248,7 +248,9 @@ static void held_ice(const bt_case *c, double concentration, bool held[2])
 bt_track bt_setup_track(const bt_case *c, double size, double thickness, double concentration)
 {
     enum { POINTS = 4000 };
-    if (c->tow.mode == BT_TOW_NONE || c->body.shape == BT_BODY_ABSENT) return (bt_track){0};
+    bt_trail body;
+    if (c->tow.mode == BT_TOW_NONE || c->body.shape == BT_BODY_ABSENT || !bt_case_trail_begin(c, &body))
+        return (bt_track){0};
     bt_case coarse = *c;
     coarse.run.dt = c->run.duration / (POINTS - 1);
     bt_world *w = one_floe(&coarse, size, thickness);
@@ -259,20 +261,19 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
     bool held[2];
     held_ice(c, concentration, held);
     bt_undisturbed_create(w, 1, held);
-    bt_tow *tow = bt_setup_tow(c);
     double *time = bt_alloc(POINTS, sizeof *time), *x = bt_alloc(POINTS, sizeof *x), *y = bt_alloc(POINTS, sizeof *y);
     bt_track t = {.n = POINTS, .time = time, .x = x, .y = y};
     for (int i = 0; i < POINTS; i++, w->step++) {
-        double d[2];
+        double at[2];
         time[i] = c->run.duration * i / (POINTS - 1);
-        bt_setup_tow_displacement(c, tow, bt_case_tow_distance(c, time[i]), d);
+        bt_case_trail_to(&body, bt_case_tow_distance(c, time[i]), at);
         t.drift[0] = w->undisturbed->drift_x, t.drift[1] = w->undisturbed->drift_y;
-        x[i] = c->body.x + d[0] - t.drift[0];
-        y[i] = c->body.y + d[1] - t.drift[1];
+        x[i] = at[0] - t.drift[0];
+        y[i] = at[1] - t.drift[1];
         bt_environment_begin(w);
         bt_undisturbed_advance(w);
     }
-    bt_tow_free(tow);
+    bt_case_trail_end(&body);
     bt_world_free(w);
     return t;
 }

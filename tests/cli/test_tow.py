@@ -254,8 +254,8 @@ def test_a_turn_within_the_window_is_no_steady_tow(tmp_path):
         assert sharp == (points[0][0] == 10) and "the course changes" not in (s["window"]["reason"] or "")
     # a carriage that passes the corner before the window, and the body behind it within
     line = {"mode": "line", "line_length": 100, "waypoints": [[200, 0], [400, 200]]}
-    for start, said in ((200, True), (385, False)):
-        case = changed(BASE_TURN, output__window_start=start, run__duration=500, tow={**BASE_TURN["tow"], **line})
+    for start, said in ((200, True), (385, True), (620, False)):
+        case = changed(BASE_TURN, output__window_start=start, run__duration=800, tow={**BASE_TURN["tow"], **line})
         reason = run(tmp_path, case, "--quiet", "--force").summary["window"]["reason"] or ""
         assert ("the course changes by 45 deg at way-point 1, passed at 170 s" in reason) == said, reason
     assert "tow.programme: from 0 to 0.5 m/s in less than a step" in call("check", write_case(
