@@ -32,11 +32,31 @@ def within(time, start, end):
 
 
 class RunError(Exception):
-    """A run folder or one of its files cannot be used. str() reads "path: reason; remedy"."""
+    """A run folder or one of its files cannot be used. str() reads "path: reason; remedy". code: the exit code of a
+    script that ends with it."""
 
-    def __init__(self, path, reason, remedy):
+    def __init__(self, path, reason, remedy, code=4):
         super().__init__(f"{path}: {reason}; {remedy}")
-        self.path, self.reason, self.remedy = Path(path), reason, remedy
+        self.path, self.reason, self.remedy, self.code = Path(path), reason, remedy, code
+
+
+class Refused(RunError):
+    """What the program refuses, in its words, one error a line, and with its exit code."""
+
+    def __init__(self, path, said, code):
+        Exception.__init__(self, said)
+        self.path, self.reason, self.remedy, self.code = Path(path), said, "", code
+
+
+class Numbers(dict):
+    """An object of summary.json. Errors: RunError for a key that it does not have."""
+
+    def __init__(self, path, found):
+        super().__init__(found)
+        self.file = path
+
+    def __missing__(self, key):
+        raise RunError(self.file, f"has no {key}", "the file is damaged, or of another version: run the case again")
 
 
 @dataclass(frozen=True)
@@ -177,7 +197,7 @@ class Run:
 
     def _read_summary(self, path):
         try:
-            summary = json.loads(path.read_text(encoding="utf-8"))
+            summary = json.loads(path.read_text(encoding="utf-8"), object_hook=lambda found: Numbers(path, found))
         except FileNotFoundError:
             if not self.result.exists():
                 raise RunError(self.path, "holds neither summary.json nor result.h5",

@@ -30,7 +30,7 @@ import stat_mean
 import units
 from bergtow_read import Run, RunError, case_value, parse_case, within
 from case_file import files, section
-from case_runs import SPENT, CaseRuns, above_zero, checked, program, whole_from
+from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 
 import numpy as np
 
@@ -160,7 +160,8 @@ class Search:
         if len(failed) >= FAILING:
             point.spent = True
             if not some:
-                raise RunError(self.runs.path(name, 0), f"every run failed: {failed[0]}", "mend the case")
+                raise RunError(self.runs.path(name, 0), f"every run failed: {failed[0]}", "mend the case",
+                               self.runs.code_of_failure())
         return True
 
     def find(self, c):
@@ -335,7 +336,7 @@ def main(argv=None):
     a = arguments(argv)
     folder = a.output or Path("out") / f"capability-{a.case.stem}"
     findings.begin("capability", a.case, "case", folder, a.force)
-    a.case, began, binary = a.case.resolve(), time.monotonic(), program()
+    began, binary = time.monotonic(), program()
     case = resolved(binary, a.case, a.set)
     check(case, a.search)
     ends = [with_number(binary, a.case, a.set, a.search, text) for text in (a.start, a.end)]
@@ -354,18 +355,19 @@ def main(argv=None):
         if not least > 0:
             raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep")
     last = began + 60 * a.budget
-    runs = CaseRuns(a.case, folder, "capability", binary, a.set, a.jobs, last, last)
+    runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
     layers = files(a.case)
     keep = a.keep_width or domain_width.stays({name: section(layers, name) for name in ("domain", "ice")}, replaced)
     search = Search(runs, a.search, unit, least, sys.stderr if sys.stderr.isatty() else None, not keep)
     some = conditions(a, binary, a.set, start, end, resolution)
-    for k, c in enumerate(some):
-        runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
-        search.find(c)
-    runs.end = last
-    for c in some:
-        search.fill(c, a.points, CURVE)
+    with locked(folder / "capability") as runs.lock:
+        for k, c in enumerate(some):
+            runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
+            search.find(c)
+        runs.end = last
+        for c in some:
+            search.fill(c, a.points, CURVE)
     if search.say:
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
@@ -383,6 +385,7 @@ def main(argv=None):
         "conditions": [found_of(c, least) for c in some]
     }
     findings.keep("capability", found, folder, a.force)
+    runs.tell_failed()
 
 
 if __name__ == "__main__":

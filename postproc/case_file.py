@@ -7,15 +7,18 @@ import yaml
 
 from bergtow_read import RunError
 
+BAD_CASE = 3  # exit code of the program
+
 
 def contents(path):
     """The file as YAML. Errors: RunError."""
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file") from None
+        raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file",
+                       4 if isinstance(error, OSError) else BAD_CASE) from None
     if not isinstance(found, dict):
-        raise RunError(path, "is neither a case nor a study", "name a case or a study file")
+        raise RunError(path, "is neither a case nor a study", "name a case or a study file", BAD_CASE)
     return found
 
 

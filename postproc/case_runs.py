@@ -2,28 +2,40 @@
 """Runs of one case with some keys replaced, made when they are asked for, as many as it takes, and kept in folders.
 What converge.py and capability.py decide from.
 
-    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by
+    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by;
+                                begun.json in place of it while the run is under way or stopped
 
-A run is kept while the case file, the files that it names, the program and the values are what they were.
+A run is kept, and one that was stopped goes on, while the case file, the files that it names, the program and the
+values are what they were. One call at a time works in DIR/SUBJECT: it
+and its runs hold the lock of the folder.
 """
 import argparse
+import errno
+import fcntl
 import hashlib
 import json
 import os
+import re
 import shutil
+import socket
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bergtow_read import Run, RunError
+from bergtow._calls import Calls
+from bergtow._interrupts import held
+from bergtow_read import Refused, Run, RunError
 from case_file import files
 
 import numpy as np
 
-STOPPED, SPENT = 6, "the budget is spent"  # exit code of a run that met its limit
+DONE, STOPPED, SPENT = 0, 6, "the budget is spent"  # exit codes of the program; a run that met its limit
+FRESH = 2, 3, 4  # exit codes of a resume that cannot go on with what there is
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 
 def texts_of(value):
@@ -48,6 +60,39 @@ def digest(path):
     return hashlib.sha256(path.read_bytes()).digest()
 
 
+def errors_in(said):
+    """The errors among the messages of the program, without its name."""
+    return [line.removeprefix("bergtow: ") for line in said.strip().splitlines()
+            if not line.startswith("bergtow: warning:")]
+
+
+def stopped_by_limit(code, said):
+    """Has a call of the program met its limit of wall time? Errors: KeyboardInterrupt where a signal or a file `stop`
+    has ended it: whoever wants that one ended wants no others."""
+    if code == STOPPED and re.search(r"stopped by (?!the limit of)", said):
+        raise KeyboardInterrupt
+    return code == STOPPED
+
+
+@contextmanager
+def locked(folder):
+    """One call at a time in a folder, as src/base/lock.c has it of runs; yields the descriptor, which runs inherit: the
+    lock holds for as long as one of them is left. Errors: RunError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666), "r+") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:  # a file system without locks has to do without
+            if error.errno not in (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS):
+                who = lock.readline().strip() or "it has not said who"
+                raise RunError(folder, f"another call is at work in this folder ({who})",
+                               "wait for its end, or give another folder with -o") from None
+        lock.truncate(0)
+        lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+        lock.flush()
+        yield lock.fileno()
+
+
 @dataclass
 class CaseRuns:
     """The runs of a study of one case."""
@@ -62,6 +107,9 @@ class CaseRuns:
     last: float            #: of the budget
     seconds: dict = field(default_factory=dict)  #: of a run, by setting
     made: int = 0          #: runs that were made, and not there before
+    failed: dict = field(default_factory=dict)   #: {folder: (why, exit code)} of runs that failed in this call
+    lock: int = -1         #: of the folder, as locked() gives it
+    calls: Calls = field(default_factory=Calls)
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
@@ -80,55 +128,90 @@ class CaseRuns:
     def path(self, name, i):
         return self.folder / self.subject / name / f"f{i + 1:03d}"
 
-    def arguments(self, name, i, values):
+    def sets(self, i, values):
         texts = (f"{k}={v if isinstance(v, str) else f'{v:.12g}'}" for k, v in values.items())
-        sets = [*self.given, "output.frame_interval=-1 s", *texts, f"ice.seed={1000 + i}"]
-        out = [str(self.program), "run", str(self.case), "-o", str(self.path(name, i)), "--quiet", "--threads", "1"]
-        return out + [part for text in sets for part in ("--set", text)]
+        return [*self.given, "output.frame_interval=-1 s", *texts, f"ice.seed={1000 + i}"]
 
-    def stamp(self, name, i, values):
-        """What a run is made by."""
+    def stamp(self, i, values):
+        """What a run is made by, wherever it lies."""
         named = [digest(self.case.parent / text).hex() for text in values.values()
                  if isinstance(text, str) and is_file(self.case.parent, text)]
-        return [self.identity, *named, *self.arguments(name, i, values)]
+        return [self.identity, *named, *self.sets(i, values)]
 
-    def kept(self, name, i, values):
-        path = self.path(name, i)
+    def stamped(self, name, i, values, file):
         try:
-            return (path / "summary.json").exists() and json.loads(
-                (path / "call.json").read_text()) == self.stamp(name, i, values)
+            return json.loads((self.path(name, i) / file).read_text()) == self.stamp(i, values)
         except (OSError, ValueError):
             return False
 
-    def one(self, name, i, values):
-        """One run, unless it is there already; None, or why it failed."""
-        path, call = self.path(name, i), self.arguments(name, i, values)
-        if self.kept(name, i, values):
+    def kept(self, name, i, values):
+        return (self.path(name, i) / "summary.json").exists() and self.stamped(name, i, values, "call.json")
+
+    def call(self, *words):
+        """Exit code and messages of a run, or of what is left of it."""
+        left = max(1.0, self.last - time.monotonic())
+        return self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
+                               f"{left:.3f}"], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
+                              pass_fds=[self.lock] if self.lock >= 0 else [])
+
+    def go_on(self, name, i, values):
+        """The same of one that an earlier call has begun; None where there is none to go on with."""
+        path = self.path(name, i)
+        if not (self.stamped(name, i, values, "begun.json") and (path / "checkpoint.h5").exists()):
             return None
+        done = self.call("resume", path)
+        return None if done[0] in FRESH else done
+
+    def begin(self, name, i, values):
+        path = self.path(name, i)
         shutil.rmtree(path, ignore_errors=True)
         path.mkdir(parents=True)
+        (path / "begun.json").write_text(json.dumps(self.stamp(i, values)))
         t0 = time.monotonic()
-        left = max(1.0, self.last - time.monotonic())
-        done = subprocess.run([*call, "--max-wall", f"{left:.3f}"],
-                              capture_output=True,
-                              text=True,
-                              env=os.environ | {"OMP_NUM_THREADS": "1"})
-        if done.returncode == STOPPED:
+        done = self.call("run", self.case, "-o", path, *(w for text in self.sets(i, values) for w in ("--set", text)))
+        if done[0] == DONE:
+            self.seconds[name] = time.monotonic() - t0
+        return done
+
+    def one(self, name, i, values):
+        """One run, unless it is there already; None, or why it failed."""
+        if self.kept(name, i, values):
+            return None
+        path = self.path(name, i)
+        code, said = self.go_on(name, i, values) or self.begin(name, i, values)
+        if stopped_by_limit(code, said):
             return SPENT
-        if done.returncode:
-            lines = done.stderr.strip().splitlines()
-            return lines[0] if lines else f"exit code {done.returncode}"
-        (path / "call.json").write_text(json.dumps(self.stamp(name, i, values)))
-        self.seconds[name] = time.monotonic() - t0
+        if code != DONE:
+            why = (errors_in(said) or [f"exit code {code}"])[0]
+            self.failed[path] = why, code
+            return why
+        os.replace(path / "begun.json", path / "call.json")
         self.made += 1
         return None
 
     def make(self, name, fields, values):
         """Runs of these fields, as many at a time as there are jobs: None, or why it failed, of each."""
         with ThreadPoolExecutor(self.jobs) as pool:
-            why = list(pool.map(lambda i: self.one(name, i, values), fields))
+            try:
+                why = list(pool.map(lambda i: self.one(name, i, values), fields))
+            except BaseException:
+                with held():
+                    self.calls.stop()
+                    pool.shutdown()
+                raise
         self.refuse_copies(name)
         return why
+
+    def code_of_failure(self):
+        """Exit code of the first run that failed."""
+        return next((code for _, (_, code) in sorted(self.failed.items())), 4)
+
+    def tell_failed(self):
+        """Errors: RunError where a run of this call has failed."""
+        for path, (why, code) in sorted(self.failed.items())[:1]:
+            more = f", and {len(self.failed) - 1} more" if len(self.failed) > 1 else ""
+            raise RunError(path, f"this run failed{more}: {why}",
+                           "what was found is without it; mend what made it fail", code)
 
     def refuse_copies(self, name):
         """Errors: RunError where two fields are the same run: what is decided by their scatter would be decided by
@@ -151,7 +234,7 @@ class CaseRuns:
             return False
         if why:
             raise RunError(self.path(name, 0), f"a run of {name} failed: {why[0]}",
-                           "mend the case" if name == "case" else "leave it out of --vary")
+                           "mend the case" if name == "case" else "leave it out of --vary", self.code_of_failure())
         return True
 
     def measured(self, name, fields, measure):
@@ -180,13 +263,12 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
     if np.isfinite(seconds):
         call += ["--max-wall", f"{max(1.0, seconds):.0f}"]
     before = ensemble_made(folder)
-    done = subprocess.run(call + ["--quiet"] * quiet, stderr=subprocess.PIPE, text=True,
-                          env=os.environ | {"OMP_NUM_THREADS": "1"})
-    if done.returncode not in (0, STOPPED) and ensemble_made(folder) == before:
-        said = (done.stderr.strip().splitlines() or [f"bergtow ensemble ended with exit code {done.returncode}"])[0]
-        raise RunError(study, said.removeprefix("bergtow: "), "mend the case or the study")
-    sys.stderr.write(done.stderr)
-    return done.returncode == 0
+    code, said = Calls().run(call + ["--quiet"] * quiet, env=os.environ | ONE_THREAD)
+    if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
+        raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
+    sys.stderr.write(said)
+    stopped_by_limit(code, said)
+    return code == DONE
 
 
 def whole_from(least, most):
@@ -218,6 +300,5 @@ def checked(binary, case, sets, *words):
     done = subprocess.run([str(binary), "check", str(case), *words, *(w for t in sets for w in ("--set", t))],
                           capture_output=True, text=True)
     if done.returncode:
-        said = (done.stderr.strip().splitlines() or ["the case is refused"])[0].removeprefix("bergtow: ")
-        raise RunError(case, said, "mend it")
+        raise Refused(case, "\n".join(errors_in(done.stderr)) or "the case is refused", done.returncode)
     return done.stdout

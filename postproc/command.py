@@ -2,7 +2,8 @@
 """What the scripts share at the command line: arguments, exit codes, messages in place of tracebacks, and files that
 are written.
 
-Exit codes: 0 done, 2 usage, 4 a file cannot be read or written, 6 stopped by the user.
+Exit codes: 0 done, 2 usage, 4 a file cannot be read or written, 6 stopped by the user or a signal; and those of the
+program where it refuses a case or a run of it fails.
 
 A file that is there is replaced only if a script of this folder made it, or with --force. Each file that they write
 carries MARK: a PNG and an MP4 in their texts, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_by`,
@@ -15,6 +16,7 @@ import json
 import math
 import mmap
 import os
+import signal
 import sys
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -141,8 +143,12 @@ def save(figure, path, force=False):
 
 
 def guarded(main):
-    """Run main() and leave the program with the exit code of what happened."""
+    """Run main() and leave the program with the exit code of what happened. What asks it to stop does so as Ctrl-C, for
+    the runs that it has started to end with checkpoints; nohup holds."""
     name = Path(sys.argv[0]).name
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):  # a terminal without a dash still gets its table
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
@@ -150,7 +156,7 @@ def guarded(main):
         main()
         sys.stdout.flush()
     except RunError as error:
-        sys.exit(_say(name, error, 4))
+        sys.exit(_say(name, error, error.code))
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
@@ -161,5 +167,5 @@ def guarded(main):
 
 
 def _say(name, message, code):
-    print(f"{name}: {message}", file=sys.stderr)
+    print("\n".join(f"{name}: {line}" for line in str(message).splitlines()), file=sys.stderr)
     return code

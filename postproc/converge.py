@@ -30,7 +30,7 @@ import command
 import findings
 import stat_mean
 from bergtow_read import Run, RunError, within
-from case_runs import SPENT, CaseRuns, above_zero, program, whole_from
+from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 
 import numpy as np
 import scipy
@@ -255,7 +255,8 @@ def varied(study, kinds, margin, tries, end):
 def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
-        raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case", "raise --budget")
+        raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
+                       "raise --budget; what was begun is kept, and the same call goes on")
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         rows += window(study, margin)
@@ -287,16 +288,19 @@ def main(argv=None):
     a = p.parse_args(argv)
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
     findings.begin("converge", a.case, "case", folder, a.force)
+    checked(program(), a.case, a.set)
     study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, a.jobs, began + 60 * a.budget,
                      began + 60 * a.budget)
-    rows = converge(study, a.vary, a.margin, a.tries)
-    values = None  # of the case: not known where the budget was spent before its first run was through
-    if study.path("case", 0).exists():
-        with Run(study.path("case", 0)) as run:
-            values = run.case
+    with locked(folder / "converge") as study.lock:
+        rows = converge(study, a.vary, a.margin, a.tries)
+        values = None  # of the case: not known where the budget was spent before its first run was through
+        if study.path("case", 0).exists():
+            with Run(study.path("case", 0)) as run:
+                values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,
              "budget_min": a.budget, "looks": LOOKS, "spent_min": (time.monotonic() - began) / 60, "rows": rows}
     findings.keep("converge", found, folder, a.force)
+    study.tell_failed()
 
 
 if __name__ == "__main__":

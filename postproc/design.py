@@ -30,7 +30,7 @@ import pdf
 import report
 from bergtow_read import Run, RunError
 from case_file import contents, files, is_study, says, section
-from case_runs import above_zero, program, run_members
+from case_runs import above_zero, checked, program, run_members
 from domain_width import read_ice_of, reads_ice
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
@@ -266,6 +266,8 @@ def main(argv=None):
     findings.also(a.also)
     for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         command.may_write(a.output / name, a.force)
+    if not study:
+        checked(program(), a.file, a.set)
     a.output.mkdir(parents=True, exist_ok=True)
     reserve = RESERVE[0] + RESERVE[1] * len(a.concentrations)
     end = began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf

@@ -44,7 +44,7 @@ def _files(name, folder):
 
 def begin(name, file, kind, folder, force):
     """Is there a case or study, and a place for what is found? Errors: RunError."""
-    if not file.is_file():
+    if not file.exists():
         raise command.RunError(file, "no such file", f"name a {kind} file")
     for path in _files(name, folder):
         command.may_write(path, force)

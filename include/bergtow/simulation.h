@@ -48,11 +48,11 @@ typedef struct bt_simulation_options {
     const char *text;         ///< the case itself, or NULL: it is read from path
     const char *const *set;   ///< [n_set] texts "key=value" that replace values of the case
     int n_set;
-    const char *dir;          ///< result folder; NULL = no files
+    const char *dir;          ///< result folder, relative to the working folder of this call; NULL = no files
     bool replace;             ///< what the folder holds of an earlier run, as --force does
     bool signals;             ///< catch signals as the program does (docs/manual.md)
     bool progress;            ///< print progress and the table at the end
-    int threads;              ///< of each rank; 0 = run.threads of the case, or all cores
+    int threads;              ///< of each rank, 1 to 1024; 0 = run.threads of the case, or all cores
     const char *command_line; ///< for the provenance of the result; NULL = none
     const char *from;         ///< bt_simulation_resume: this checkpoint instead of the last one in dir; or NULL
 } bt_simulation_options;

@@ -22,6 +22,7 @@ SONAME = "libbergtow.so.0"
 OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 LOADS = 10  # BT_APPLIED_NUMBERS
 CONTACT_COLUMNS = 12  # BT_CONTACT_COLUMNS
+MOST_THREADS = 1024  # BT_MOST_THREADS
 
 
 class BergtowError(Exception):
@@ -133,6 +134,9 @@ def threads_here(asked: int) -> int:
     """Threads for a simulation that begins: in a fork of a process that had simulations one alone, for a team of more
     would wait for those that the fork has left behind."""
     global team
+    if not 0 <= asked <= MOST_THREADS:  # before the library has it as a number of 32 bits
+        raise BergtowError(f"threads: {asked} cannot be had; give 1 to {MOST_THREADS}, or 0 for run.threads of the "
+                           "case or all cores")
     if team in (None, os.getpid()):
         if asked != 1:
             team = os.getpid()
@@ -219,14 +223,24 @@ def start_mpi() -> None:
         raise BergtowError("MPI cannot be started; check the mpirun call")
 
 
+def whole(text: bytes, what: str, status: int = USAGE) -> bytes:
+    """A text for the library. Errors: BergtowError for one with a NUL, at which it would end in C."""
+    if b"\0" in text:
+        raise (CaseError if status == CASE else BergtowError)(f"{what} holds the character NUL; take it out", status)
+    return text
+
+
 def options(case: Case | None, **more: Any) -> Options:
-    """bt_simulation_options of a Case, or None."""
-    texts = {k: os.fsencode(v) if v is not None else None for k, v in more.items()
-             if k in ("dir", "command_line", "from_")}
+    """bt_simulation_options of a Case, or None. Errors: BergtowError for a text with a NUL."""
+    names = {"dir": "the name of the result folder", "command_line": "the command line",
+             "from_": "the name of the checkpoint"}
+    more |= {k: whole(os.fsencode(more[k]), name) for k, name in names.items() if more.get(k) is not None}
     if case is None:
-        return Options(**(more | texts))
-    overrides = [f"{key}={value}".encode() for key, value in case.overrides.items()]
-    place = case.place()
-    return Options(path=os.fsencode(place) if place is not None else None,
-                   text=case.text.encode(errors="surrogateescape") if case.text is not None else None,
-                   set=(c_char_p * len(overrides))(*overrides), n_set=len(overrides), **(more | texts))
+        return Options(**more)
+    overrides = [whole(f"{key}={value}".encode(), f"{key}: the value", CASE) for key, value in case.overrides.items()]
+    place, text = case.place(), case.text
+    line = 1 + (text or "").partition("\0")[0].count("\n")
+    return Options(path=whole(os.fsencode(place), "the path of the case", CASE) if place is not None else None,
+                   text=whole(text.encode(errors="surrogateescape"), f"{place or 'case'}:{line}: the line", CASE)
+                   if text is not None else None,
+                   set=(c_char_p * len(overrides))(*overrides), n_set=len(overrides), **more)

@@ -81,7 +81,7 @@ def _content(path: str) -> str | None:
     return None if b"\0" in data else data.decode(errors="surrogateescape")
 
 
-def _here() -> str:
+def here() -> str:
     try:
         return os.getcwd()
     except OSError:  # the folder is gone: names that are not absolute lead nowhere
@@ -122,7 +122,7 @@ class Case(MutableMapping[str, Any]):
         self.path = None if source is None or isinstance(source, Mapping) else os.fspath(source)
         if self.path is None and text is None and not isinstance(source, Mapping):
             raise TypeError("a case needs a file, a mapping or a text")
-        self._folder = _here()
+        self._folder = here()
         self.text = (text if text is not None else _as_file(source) if isinstance(source, Mapping) else
                      _content(self.path or ""))
         self.overrides: dict[str, str] = {}  #: {key: text} that were set here
@@ -149,7 +149,7 @@ class Case(MutableMapping[str, Any]):
 
     def place(self) -> str | None:
         """The path, also from another working folder than that in which the case was made."""
-        return self.path if _here() == self._folder else os.path.join(self._folder, self.path or "case")
+        return self.path if here() == self._folder else os.path.join(self._folder, self.path or "case")
 
     def as_it_was(self) -> Case:
         """A copy, if the files that the case builds on (`base`) still say what they did; CaseError otherwise."""

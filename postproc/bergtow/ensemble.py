@@ -5,14 +5,12 @@ from __future__ import annotations
 import html
 import os
 import shutil
-import signal
-import subprocess
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _library
+from ._calls import Calls
 from ._library import IO, OK, BergtowError
 from .case import setting
 from .engines import on_workers
@@ -88,22 +86,10 @@ class Ensemble:
             command = [word for word in command if word != "--retry-failed"]
         command += ["--threads", str(threads)] if threads else []
         # a group of its own: a Ctrl-C comes here, and reaches the program once
-        with tempfile.TemporaryFile("w+") as errors:
-            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True,
-                                  start_new_session=True) as process:
-                try:
-                    assert process.stdout
-                    for line in process.stdout:
-                        if progress:
-                            print(line, end="", flush=True)
-                except KeyboardInterrupt:
-                    process.send_signal(signal.SIGINT)
-                    process.communicate()
-                    raise
-            errors.seek(0)
-            if process.returncode != OK:
-                raise BergtowError(errors.read().strip() or f"bergtow ensemble ended with {process.returncode}",
-                                   process.returncode)
+        code, errors = Calls().run(command, lambda text: progress and print(text, end="", flush=True),
+                                   start_new_session=True)
+        if code != OK:
+            raise BergtowError(errors.strip() or f"bergtow ensemble ended with {code}", code)
         return cls(out)
 
     def _open(self) -> h5py.File:

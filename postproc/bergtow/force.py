@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import signal
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _library
+from ._interrupts import held
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -101,31 +100,6 @@ class Bodies:
 Force = Callable[[Bodies], "npt.ArrayLike | None"]
 
 
-@contextlib.contextmanager
-def interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits for the end of the block, where it would otherwise be raised within the call from C, and lost. A
-    second one is raised in the force that is under way."""
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    came: list[Any] = []
-    passed_on: Callable[..., Any] = handler
-
-    def hold(*what: Any) -> None:
-        came.append(what)
-        if len(came) > 1 and Forces.calling:
-            passed_on(*what)
-
-    signal.signal(signal.SIGINT, hold)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        if came:
-            passed_on(*came[0])
-
-
 class Forces:
     """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
     in turn with this one, does nothing in the steps of this."""
@@ -165,8 +139,9 @@ class Forces:
 
     @staticmethod
     def _apply(name: str, callback: Any, doc: str) -> None:
+        texts = [_library.whole(text.encode(), f"force {name!r}: its name or docstring") for text in (name, doc)]
         err = _library.Errors()
-        status = _library.library().bt_force_apply(name.encode(), doc.encode(), callback, None, ctypes.byref(err))
+        status = _library.library().bt_force_apply(*texts, callback, None, ctypes.byref(err))
         text = "\n".join(err.text[k].decode() for k in range(err.n))
         _library.library().bt_errors_free(ctypes.byref(err))
         if status != _library.OK:
@@ -196,7 +171,7 @@ class Forces:
         if not self.functions:
             yield
             return
-        with _library.LOCK, interrupts_held():
+        with _library.LOCK, held(lambda: Forces.calling):
             before, Forces.stepping = Forces.stepping, self
             try:
                 yield

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from . import _library
+from ._interrupts import held
 from ._library import BergtowError
-from .case import Case
+from .case import Case, here
 from .force import Force, Forces
 from .results import Result
 
@@ -71,21 +72,29 @@ class Simulation:
     def _begin(self, function: str, case: Case | None, out: str | os.PathLike[str] | None,
                forces: Mapping[str, Force] | None, **more: Any) -> None:
         self._address: c_void_p | None = None
+        self._process = os.getpid()
         self._library = _library.library()
         more["threads"] = _library.threads_here(more["threads"])
         case = None if case is None else case.as_it_was()
+        folder = None if out is None else os.fsdecode(out)
+        self.folder = os.path.join(here(), folder) if folder else folder  # the working folder may become another one
         self._forces = Forces(forces)
-        self.folder = None if out is None else os.fspath(out)
         try:
             address = c_void_p()
             command_line = " ".join(["python", *(os.path.basename(a) for a in sys.argv[:1])])
             o = _library.options(case, dir=self.folder, command_line=command_line, **more)
-            getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o))
+            with held():
+                getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o))
+                self._address = address
+            self._look(case)
         except BaseException:
+            self.drop()
             self._forces.release()
             raise
-        self._address = address
-        self._process = os.getpid()
+
+    def _look(self, case: Case | None) -> None:
+        """What stays as it is."""
+        address = self._s
         self.case = case if case is not None else Case(os.path.join(self.folder or "", "case.resolved.yml"))
         towed = self._library.bt_simulation_towed(address)
         self.has_towed: bool = towed >= 0
@@ -130,7 +139,7 @@ class Simulation:
             self._close("bt_simulation_drop")
 
     def _close(self, function: str) -> None:
-        with _library.LOCK:
+        with _library.LOCK, held():
             address = self._s
             if Forces.stepping is self._forces and self._forces.functions:
                 raise BergtowError("a force cannot end the simulation that calls it; end it when the step is done")
@@ -258,7 +267,8 @@ class Simulation:
         value = c_double()
         address = self._s
         try:
-            self._library.bt_simulation_quantity(address, name.encode(), ctypes.byref(value))
+            self._library.bt_simulation_quantity(address, _library.whole(name.encode(), f"{name!r}: the name"),
+                                                 ctypes.byref(value))
         except BergtowError as error:
             raise KeyError(str(error)) from None
         return value.value
@@ -300,9 +310,8 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
     progress: True for a line that the run renews a few times a second, in notebooks too; or a function, called as
     often with the Simulation.
     """
+    show, last = _line if progress is True else progress, 0.0
     with Simulation(case, out, forces=forces, threads=threads, replace=replace) as sim:
-        show = _line if progress is True else progress
-        last = 0.0
         try:
             while sim.steps_left:
                 sim.step(10)

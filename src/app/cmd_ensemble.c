@@ -3,6 +3,7 @@
 #include "bergtow/ensemble.h"
 #include "app/cmd.h"
 #include "app/jobs.h"
+#include "base/largest.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +25,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         o->run.dir = arg;
         return 0;
-    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
     case 'j': o->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, 1, BT_MAX_JOBS); return 0;
     case 'q': o->run.quiet = true; return 0;
     case KEY_RETRY: o->run.retry = true; return 0;

@@ -4,6 +4,7 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
+#include "base/largest.h"
 #include "output/folder.h"
 
 #include <inttypes.h>
@@ -41,7 +42,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         o->run.dir = arg;
         return 0;
-    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
     case 'q': o->run.quiet = true; return 0;
     case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
     case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;

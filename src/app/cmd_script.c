@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The commands that are scripts: `bergtow NAME` starts postproc/NAME.py, which runs this program for its members and
+// The commands that are scripts: `bergtow NAME` becomes postproc/NAME.py, which runs this program for its members and
 // judges them with the statistics of the ensembles. Those are Python's; a second copy in C would be one too many.
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/launcher.h"
 
-#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 /// The folder that is `up` steps above a program, with a name below it; the caller frees it.
@@ -40,28 +38,12 @@ static char *find_script(const char *program, const char *command)
     return beside(program, 3, script); // build/release/bergtow
 }
 
-/// Exit code of the script, −1 when it cannot be started.
-static int start(const char *python, char **arguments)
-{
-    fflush(stdout);
-    const pid_t child = fork();
-    if (child == 0) {
-        execv(python, arguments);
-        _exit(127);
-    }
-    int how = 0;
-    while (child > 0 && waitpid(child, &how, 0) < 0 && errno == EINTR) {}
-    if (child < 0 || (WIFEXITED(how) && WEXITSTATUS(how) == 127)) return -1;
-    return WIFEXITED(how) ? WEXITSTATUS(how) : BT_ERR_SIGNAL;
-}
-
 int bt_cmd_script(int argc, char **argv)
 {
     bt_errors err = {0};
     char program[PATH_MAX] = "";
     const char *python = getenv("PYTHON") ? getenv("PYTHON") : "/usr/bin/python3";
     char *path = NULL;
-    int code = -1;
     if (bt_comm_world()->size > 1) {
         bt_errors_add(&err,
                       "%s: is no program of ranks; call it without mpirun or srun: what runs it needs it starts "
@@ -77,13 +59,15 @@ int bt_cmd_script(int argc, char **argv)
         arguments[argc + 1] = NULL;
         setenv("BERGTOW", program, 1);
         bt_launcher_forget(); // of one rank
-        code = start(python, arguments);
+        bt_comm_end(BT_OK);   // a launcher waits for it
+        fflush(NULL);
+        execv(python, arguments); // in place of this process: what is sent to it reaches the script
         free(arguments);
-        if (code < 0) bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);
+        bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);
     } else {
         bt_errors_add(&err, "%s: cannot be read; name the folder that holds postproc/ in BERGTOW_HOME",
                       path ? path : argv[0]);
     }
     free(path);
-    return code < 0 ? bt_cmd_end(&bt_comm_alone, BT_ERR_IO, &err) : code;
+    return bt_cmd_end(&bt_comm_alone, BT_ERR_IO, &err);
 }

@@ -25,6 +25,7 @@ enum {
     BT_MOST_POINTS = 10000,            ///< points of a list such as tow.waypoints
     BT_MOST_VALUES = 10000,            ///< values of one parameter of a study
     BT_MOST_COMPLAINTS = 200,          ///< errors of one case that are reported
+    BT_MOST_THREADS = 1024,            ///< of a rank
     BT_MOST_FLOES = 20000000,          ///< about 40 GB; also keeps bt_idx far from its limit
     BT_MOST_STEPS = 100000000,         ///< the summary keeps 120 bytes of each
     BT_MOST_FRAMES = 1000000,

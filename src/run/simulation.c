@@ -7,7 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "base/fileio.h"
+#include "base/largest.h"
 #include "base/lock.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
@@ -86,6 +89,15 @@ static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors
 
 static char *copy_of(const char *text) { return text ? bt_text_copy(text) : NULL; }
 
+/// A place as an absolute path: the program may change its working folder while the simulation lasts.
+static char *place_of(const char *path)
+{
+    char *here = path && *path && *path != '/' ? getcwd(NULL, 0) : NULL;
+    char *whole = here ? bt_file_join(here, path) : copy_of(path);
+    free(here);
+    return whole;
+}
+
 static void release(bt_simulation *s)
 {
     bt_lock_drop(s->dir, s->m.lock);
@@ -101,8 +113,8 @@ static void release(bt_simulation *s)
 static bt_simulation *simulation_of(const bt_simulation_options *o)
 {
     bt_simulation *s = bt_alloc(1, sizeof *s);
-    s->dir = copy_of(o->dir);
-    s->from = copy_of(o->from);
+    s->dir = place_of(o->dir);
+    s->from = place_of(o->from);
     s->command_line = copy_of(o->command_line);
     s->o = (bt_run_options){.dir = s->dir,
                             .from = s->from,
@@ -123,6 +135,14 @@ static bt_status begin(bt_simulation *s, bt_errors *err)
     return status;
 }
 
+static bt_status check_threads(const bt_simulation_options *o, bt_errors *err)
+{
+    if (o->threads >= 0 && o->threads <= BT_MOST_THREADS) return BT_OK;
+    bt_errors_add(err, "threads: %d cannot be had; give 1 to %d, or 0 for run.threads of the case or all cores",
+                  o->threads, BT_MOST_THREADS);
+    return BT_ERR_USAGE;
+}
+
 /// The end of create and resume.
 static bt_status hand_out(bt_simulation **out, bt_simulation *s, bt_status status, bt_errors *err)
 {
@@ -136,7 +156,8 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
     const bt_comm *comm = bt_comm_world();
     bt_errors err = {0};
     bt_simulation *s = simulation_of(o);
-    bt_status status = read_case(&s->c, o, &err);
+    bt_status status = check_threads(o, &err);
+    if (status == BT_OK) status = read_case(&s->c, o, &err);
     if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = begin(s, &err);
@@ -148,10 +169,11 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     bt_errors err = {0};
     bt_simulation *s = simulation_of(o);
     bt_resume k = {.lock = -1};
-    bt_status status = BT_ERR_USAGE;
+    bt_status status = check_threads(o, &err);
     if (!o->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
     else if (o->path || o->text || o->n_set > 0)
         bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation", o->dir);
+    if (err.n > 0) status = BT_ERR_USAGE;
     else status = bt_resume_begin(&k, bt_comm_world(), &s->o, &err);
     if (status == BT_OK && k.finished) {
         bt_errors_add(&err, "%s is finished: all %lld steps are done", o->dir, (long long)bt_case_steps(&k.c));
@@ -214,6 +236,15 @@ static bt_status close_parts(bt_simulation *s, bt_status status, bt_errors *err)
     return status;
 }
 
+/// Texts that stand one a line in `text`.
+static void add_lines(bt_errors *err, const char *text)
+{
+    char *copy = bt_text_copy(text), *rest = copy;
+    for (char *line; (line = strsep(&rest, "\n"));)
+        if (*line) bt_errors_add(err, "%s", line); // ranks other than 0 have no text
+    free(copy);
+}
+
 bt_status bt_simulation_end(bt_simulation *s)
 {
     if (s == stepping) return refuse_within();
@@ -221,7 +252,7 @@ bt_status bt_simulation_end(bt_simulation *s)
     bt_status status = s->status == BT_ERR_SIGNAL ? BT_OK : s->status;
     if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
     status = close_parts(s, status, &err);
-    if (status != BT_OK && err.n == 0 && s->why) bt_errors_add(&err, "%s", s->why);
+    if (status != BT_OK && err.n == 0 && s->why) add_lines(&err, s->why);
     release(s);
     return reported(status, &err);
 }

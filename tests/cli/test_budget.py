@@ -382,19 +382,20 @@ def test_a_study_end_to_end(small):
 @pytest.mark.slow
 def test_what_is_refused(small, tmp_path):
     folder, _ = small
-    def said(study, *more, out="refused"):
+    def said(study, *more, out="refused", code=4):
         write_case(tmp_path, BASE, "base.yml")
         write_case(tmp_path, study, "study.yml")
         done = script("budget.py", "study.yml", "-o", out, *more, cwd=tmp_path)
-        assert done.returncode == 4 and "Traceback" not in done.stderr
+        assert done.returncode == code and "Traceback" not in done.stderr
         return done.stderr
     def varied(**entry):
         return STUDY | {"parameters": {"ice.friction": {"from": 0.1, "to": 0.5} | entry}}
-    assert "ice.friction.distribution: bell: give uniform, triangular or normal" in said(varied(distribution="bell"))
+    assert "ice.friction.distribution: bell: give uniform, triangular or normal" in said(varied(distribution="bell"),
+                                                                                     code=3)
     wide = {"from": 0.001, "distribution": "normal"}
-    assert "a normal distribution with 95 % from 0.001 to 0.5 reaches: -0.1" in said(varied(**wide))
+    assert "a normal distribution with 95 % from 0.001 to 0.5 reaches: -0.1" in said(varied(**wide), code=3)
     grid = {k: v for k, v in STUDY.items() if k not in ("sampling", "samples")}
-    assert "set sampling: latin-hypercube and samples" in said(grid)
+    assert "set sampling: latin-hypercube and samples" in said(grid, code=3)
     assert "no such file" in subprocess.run([BERGTOW, "budget", "none.yml"], env=environment(BERGTOW_HOME=ROOT),
                                             cwd=tmp_path, capture_output=True, text=True).stderr
     assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
@@ -404,7 +405,7 @@ def test_what_is_refused(small, tmp_path):
         assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out")
     # the folder holds another study: its numbers are no answer to this one
     for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
-        assert "another study" in said(study, *more, out=folder / "out")
+        assert "another study" in said(study, *more, out=folder / "out", code=3)
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))

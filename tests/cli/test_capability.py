@@ -335,7 +335,7 @@ def test_a_line_that_parts_is_no_tow(tmp_path):
 def test_what_is_refused(tmp_path):
     assert "mode speed, which no ice stops; set tow.mode to thrust" in found_in(tmp_path, TOW, code=4)
     assert "say its range with --from and --to" in found_in(tmp_path, THRUST, "--search", "ice.friction", code=2)
-    assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=4)
+    assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=3)
     assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=4)
     assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=4)
     for more in (("--for", "ice.concentration=0.5,0.6"), ("--set", "ice.concentration = 0.5"),

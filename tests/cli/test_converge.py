@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """postproc/converge.py: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
 import json
+import re
 import subprocess
 import sys
 import time
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, TOW, changed, environment, script, write_case
+from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
@@ -162,7 +163,10 @@ def test_what_is_refused(tmp_path):
     lost = subprocess.run([BERGTOW, "converge", "case.yml"], env=environment(BERGTOW_HOME=tmp_path), cwd=tmp_path,
                           capture_output=True, text=True)
     assert lost.returncode == 4 and "name the folder that holds postproc/ in BERGTOW_HOME" in lost.stderr
-    assert bad.returncode == 4 and "unknown key" in bad.stderr and "Traceback" not in bad.stderr
+    assert bad.returncode == 3 and "unknown key" in bad.stderr and "Traceback" not in bad.stderr
+    assert not (tmp_path / "out").exists()
+    device = said("/dev/null", "-o", "out")
+    assert device.returncode == 4 and "is a device" in device.stderr and "no such file" not in device.stderr
 
 
 def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
@@ -209,7 +213,7 @@ def settled(runs, i, values=None, name="case", **summary):
     """A run as the program leaves it, without its results."""
     runs.path(name, i).mkdir(parents=True, exist_ok=True)
     (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
-    (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(name, i, values or {})))
+    (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(i, values or {})))
 
 
 @pytest.mark.parametrize("where", ["case", "base", "set", "value"])
@@ -226,6 +230,67 @@ def test_a_file_that_the_case_names_is_a_part_of_it(tmp_path, where):
     assert runs_of(tmp_path, case, given).kept("case", 0, values)
     (tmp_path / "current.csv").write_text("t,u,v\n0,1,0\n")
     assert not runs_of(tmp_path, case, given).kept("case", 0, values)
+
+
+def test_runs_are_kept_however_the_folder_is_spelt(tmp_path, monkeypatch):
+    runs = runs_of(tmp_path, CASE)
+    settled(runs, 0)
+    monkeypatch.chdir(tmp_path)
+    link = tmp_path / "bergtow"
+    link.symlink_to(BERGTOW)
+    again = case_runs.CaseRuns(runs.case, Path("out"), "converge", link, [], 1, np.inf, np.inf)
+    assert again.kept("case", 0, {}) and not again.kept("case", 1, {})
+
+
+def test_a_run_that_met_the_budget_goes_on(tmp_path, monkeypatch):
+    """Red when it is made anew: one that is longer than the budget would never end."""
+    long = changed(CASE, run__dt=0.02, run__duration=60, domain__length=22)
+    runs = runs_of(tmp_path, long)
+    runs.last = time.monotonic()  # a second, the shortest limit
+    assert runs.make("case", [0], {}) == [case_runs.SPENT] and not runs.kept("case", 0, {})
+    assert json.loads((runs.path("case", 0) / "summary.json").read_text())["stopped"]
+    again = runs_of(tmp_path, long)
+    again.last = time.monotonic() + 300
+    monkeypatch.setattr(again, "begin", None)
+    assert again.make("case", [0], {}) == [None] and again.kept("case", 0, {})
+    there = json.loads((runs.path("case", 0) / "summary.json").read_text())
+    plain = run(tmp_path / "plain", long, "--set", "ice.seed=1000")
+    assert there["state_hash"] == plain.hash and there["n_steps"] == 3000
+    # of other values it is another run
+    other = runs_of(tmp_path, long, ["ice.friction=0.1"])
+    assert other.go_on("case", 0, {}) is None and not other.kept("case", 0, {})
+
+
+def test_one_call_at_a_time_works_in_a_folder(tmp_path):
+    """Red when the second removes the runs of the first; and the lock is that of the runs, too, which a call that is
+    killed leaves behind."""
+    write_case(tmp_path, CASE)
+    with case_runs.locked(tmp_path / "out/converge") as lock:
+        left = subprocess.Popen(["sleep", "60"], pass_fds=[lock])
+    try:
+        second = script("converge.py", "case.yml", "-o", "out", cwd=tmp_path)
+        assert second.returncode == 4, second.stderr
+        assert re.search(r"out/converge: another call is at work in this folder \(process \d+ on ", second.stderr)
+        assert [p.name for p in tmp_path.glob("out/*/*")] == ["lock"] and not (tmp_path / "out/converge.json").exists()
+    finally:
+        left.kill()
+        left.wait()
+    with case_runs.locked(tmp_path / "out/converge"):
+        pass
+
+
+def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
+    made = case_runs.CaseRuns.begin
+    monkeypatch.setattr(case_runs.CaseRuns, "begin", lambda runs, name, i, values: made(runs, name, i, values) if
+                        name == "case" else (5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n"))
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    short = changed(CASE, run__duration=5, output__window_start=2)
+    path = write_case(tmp_path, short)
+    with pytest.raises(RunError, match=r"dt-1/f001: this run failed, and 3 more: step 3: no sound state") as failed:
+        converge.main([str(path), "-o", str(tmp_path / "out"), "--vary", "dt", "--jobs", "1"])
+    assert failed.value.code == 5
+    row, = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
+    assert row["judged"] == "open" and "no sound state" in row["why"]
 
 
 def test_fields_are_those_that_are_there(tmp_path, monkeypatch):

@@ -289,6 +289,31 @@ def test_a_second_ctrl_c_ends_a_force_that_hangs(ctrl_c):
         stepped(OPEN, forces={"hangs": hangs})
 
 
+def test_ctrl_c_while_a_simulation_begins_leaves_none_behind(ctrl_c, tmp_path, monkeypatch):
+    """It comes while the ice is made, in the call from C. Red when the folder stays locked and the force taken."""
+    library, out = bergtow._library.library(), tmp_path / "out"
+    create = library.bt_simulation_create
+
+    def interrupted(*arguments):
+        answer = create(*arguments)
+        os.kill(os.getpid(), signal.SIGINT)
+        return answer
+
+    def begin():
+        return bergtow.Simulation(OPEN, out, threads=1, forces={"begun": lambda bodies: None}, replace=True)
+
+    monkeypatch.setattr(library, "bt_simulation_create", interrupted)
+    kept = []
+    for call in (begin, lambda: bergtow.run(OPEN, out, threads=1, replace=True)):
+        try:
+            call()
+        except KeyboardInterrupt as error:
+            kept.append(error)  # and with it all frames that it came through, as at a prompt
+    monkeypatch.undo()
+    with begin() as sim:
+        assert len(kept) == 2 and sim.steps == 0
+
+
 def test_threads_take_turns():
     def push(bodies):
         bodies.force[:, 0] += 0.01

@@ -48,6 +48,27 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
     assert len(str(caught.value).splitlines()) >= 2 and caught.value.status == 3
 
 
+def test_a_text_that_would_end_at_a_nul_is_refused(tmp_path):
+    text = json.dumps(SHORT, indent=1)
+    with pytest.raises(bergtow.CaseError, match=r"^run.title: the value holds the character NUL; take it out$"):
+        bergtow.Case(SHORT, {"run.title": "a\0b"})
+    with pytest.raises(bergtow.CaseError, match=rf"^case:{text.count(chr(10)) + 2}: the line holds the character NUL"):
+        bergtow.Case.from_text(text + "\n\0\nbogus: 1")
+    with pytest.raises(bergtow.BergtowError, match="^the name of the result folder holds the character NUL"):
+        bergtow.Simulation(SHORT, str(tmp_path / "a\0b"))
+    with pytest.raises(bergtow.BergtowError, match="^force 'a.*b': its name or docstring holds the character NUL"):
+        bergtow.Simulation(SHORT, forces={"a\0b": lambda bodies: None})
+    with bergtow.Simulation(SHORT, threads=1) as sim, pytest.raises(KeyError, match="holds the character NUL"):
+        sim["time\0"]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("threads", [-1, 1025, 10_000_000, 2 ** 32 + 1])
+def test_threads_are_as_many_as_the_command_takes(threads):
+    with pytest.raises(bergtow.BergtowError, match=f"^threads: {threads} cannot be had; give 1 to 1024"):
+        bergtow.Simulation(SHORT, threads=threads)
+
+
 def test_a_case_has_the_values_of_the_resolved_one(tmp_path):
     listed = {key["name"]: key for key in json.loads(call("--list-keys", "--json").stdout)["keys"]}
     case = bergtow.Case(WINDOW, {"run.title": 'an "odd" one: # 1'})

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Simulations stepped from Python: the same bits as the command, what is saved and taken up, bodies and contacts."""
 import math
+import os
 import re
 import shutil
 import subprocess
@@ -44,6 +45,24 @@ def test_simulations_that_are_stepped_in_turn_keep_apart(tmp_path):
             b.step(3)
         assert len(pushed) == b.steps == 36
         assert a.state_hash == run(tmp_path, SHORT).hash != b.state_hash
+
+
+def test_the_working_folder_may_become_another(tmp_path, monkeypatch):
+    """Red when a relative name goes by the folder that is the working one later."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    monkeypatch.chdir(tmp_path / "a")
+    with bergtow.Simulation(SHORT, "out", threads=1) as sim:
+        sim.step(10)
+        os.chdir(tmp_path / "b")
+        sim.checkpoint()
+        sim.step(10)
+    assert bergtow.Result(tmp_path / "a/out").summary["n_steps"] == 20 and not list((tmp_path / "b").iterdir())
+    os.chdir(tmp_path / "a")
+    with bergtow.Simulation.resume("out", threads=1) as sim:
+        os.chdir(tmp_path / "b")
+        sim.step(1000)
+    assert bergtow.Result(tmp_path / "a/out").summary["state_hash"] == run(tmp_path, SHORT).hash
 
 
 def test_an_early_end_is_that_of_the_option_steps(tmp_path):
@@ -201,6 +220,32 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
     said = [(tmp_path / f"rank{k}").read_text().split() for k in range(2)]
     assert {h for *_, h in said} == {run(tmp_path, case).hash}
     assert any(int(held) < int(n) for held, n, _ in said)
+
+
+@pytest.mark.ranks
+def test_the_end_after_a_failed_step_has_its_texts_one_a_line(tmp_path):
+    """On rank 0, which has those of all. Red when they are one line with question marks."""
+    script = tmp_path / "ranks.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow, os, pathlib
+bergtow.start_mpi()
+rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK"))
+def broken_on(one):
+    def force(bodies): bodies.force[:] = float("nan") if rank == one else 0
+    return force
+sim, said = bergtow.Simulation({SHORT!r}, threads=1, forces={{f"on_{{k}}": broken_on(k) for k in "01"}}), []
+for call in (lambda: sim.step(3), sim.end):
+    try: call()
+    except bergtow.BergtowError as error: said.append(str(error))
+(pathlib.Path(__file__).parent / ("rank" + rank)).write_text("|".join(said))
+""")
+    result = subprocess.run([*launcher(2), sys.executable, script], capture_output=True, text=True, timeout=120,
+                            env=environment())
+    assert result.returncode == 0, result.stdout + result.stderr
+    step, end = (tmp_path / "rank0").read_text().split("|")
+    assert step == end and [line.split(":")[0] for line in end.splitlines()] == ["force on_0", "force on_1"]
+    assert (tmp_path / "rank1").read_text() == "failed with status 5|failed with status 5"
 
 
 @pytest.mark.slow

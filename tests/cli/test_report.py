@@ -487,7 +487,8 @@ def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
 
 
 @pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"),
-                                         ("truncated", "not readable as HDF5"), ("frames", "/frames/pose")])
+                                         ("truncated", "not readable as HDF5"), ("frames", "/frames/pose"),
+                                         ("key", "summary.json: has no collisions_whole_run; ")])
 def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, harm, words):
     folder = tmp_path / "run"
     if harm != "folder":
@@ -497,6 +498,9 @@ def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, har
         (folder / "report.html").write_text(OLD)
     if harm == "summary":
         (folder / "summary.json").unlink()
+    elif harm == "key":
+        less = {k: v for k, v in tow.summary["impacts"].items() if k != "collisions_whole_run"}
+        (folder / "summary.json").write_text(json.dumps(tow.summary | {"impacts": less}))
     elif harm == "truncated":
         (folder / "result.h5").write_bytes((tow.dir / "result.h5").read_bytes()[:5000])
     elif harm == "frames":

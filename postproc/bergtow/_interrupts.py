@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Ctrl-C, and other requests to stop, that wait for the end of a block."""
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+#: what asks a program to stop, and raises an exception where it has a handler of Python
+STOPS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+
+@contextlib.contextmanager
+def held(let_through: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """A request to stop is raised at the end of the block, where it would otherwise come within a call from C, and be
+    lost, or between a call and the name that its answer is kept by. let_through: is a second one raised at once?"""
+    handlers: dict[int, Callable[[int, Any], Any]] = {}
+    for stop in STOPS:
+        if callable(handler := signal.getsignal(stop)):
+            handlers[stop] = handler
+    if threading.current_thread() is not threading.main_thread() or not handlers:
+        yield
+        return
+    came: list[tuple[int, Any]] = []
+
+    def hold(number: int, frame: Any) -> None:
+        came.append((number, frame))
+        if len(came) > 1 and let_through():
+            handlers[number](number, frame)
+
+    for number in handlers:
+        signal.signal(number, hold)
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if came:
+            handlers[came[0][0]](*came[0])
