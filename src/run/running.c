@@ -70,7 +70,9 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     free(r->roster.thickness); // result.h5 has it
     r->roster.thickness = NULL;
     if (status != BT_OK) return status;
-    if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    status = bt_comm_agree(r->comm, bt_record_identify(r->record, r->identity, err));
+    if (status == BT_OK && r->w->impacts)
+        status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
     if (status != BT_OK) bt_record_abandon(r->record);
     return status;
@@ -172,6 +174,7 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
     status = bt_comm_agree(r->comm, status);
     if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
     if (status == BT_OK) {
+        if (r->comm->rank == 0 && r->o->dir) r->identity = bt_running_identity(r->c, &f, kept);
         keep_field(r, &f, &lead, threads);
         if (kept) {
             status = bt_running_load(r, kept, err);
@@ -481,5 +484,6 @@ bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
     bt_roster_free(&r->roster);
     bt_world_free(r->w);
     free(r->digests);
+    free(r->identity);
     return status;
 }
