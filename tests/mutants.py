@@ -663,6 +663,9 @@ MUTANTS = {
         ("same = same && !strncmp(text, made, strlen(made));", "", "a run starts again by a case that was edited"),
         ("same = *at == '#' || *at == '\\n';", "same = true;", "keys behind the case that the digest is of"),
     ]),
+    "src/run/ensemble.c": (["cli/test_ensemble_failures.py", "cli/test_ensemble.py"], [
+        ("&why)) < 0 && !x->busy)", "&why)) < 0)", "a member that a resume is at has failed"),
+    ]),
     "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
                                          "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint",
                                          "cli/test_resume.py"], [

@@ -35,7 +35,7 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
         bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", o->dir);
         return BT_ERR_IO;
     }
-    if ((k->lock = bt_lock_take(o->dir, err)) < 0) return BT_ERR_IO;
+    if (!o->held && (k->lock = bt_lock_take(o->dir, NULL, err)) < 0) return BT_ERR_IO;
     bt_folder_recover(o->dir);
     k->fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
                !bt_file_there(o->dir, "summary.json");
