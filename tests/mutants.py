@@ -676,6 +676,19 @@ MUTANTS = {
         ("        bt_record_flush(r);\n        status = r->h5.status;", "        status = r->h5.status;",
          "not flushed"),
     ]),
+    "src/output/record_run.c": (["cli/test_other_runs.py"], [
+        ("if (its && mine && strcmp(its, mine) != 0)", "if (0)", "what two runs began with is not compared"),
+        ("if (!(its && mine) && !same_case(r->c, s, old))", "if (0)", "cases of earlier files are not compared"),
+        ("if (entry == x[i] ||", "if (1 ||", "series are not compared with the history"),
+        ("if (!read || strcmp(text, wanted) != 0) {", "if (0) {", "a case that was edited stays"),
+    ]),
+    "src/case/case_files.c": (["cli/test_other_runs.py", "cli/test_resume.py"], [
+        ("same = same && !strncmp(text, made, strlen(made));", "", "a run starts again by a case that was edited"),
+        ("same = *at == '#' || *at == '\\n';", "same = true;", "keys behind the case that the digest is of"),
+    ]),
+    "src/run/ensemble.c": (["cli/test_ensemble_failures.py", "cli/test_ensemble.py"], [
+        ("&why)) < 0 && !x->busy)", "&why)) < 0)", "a member that a resume is at has failed"),
+    ]),
     "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
                                          "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint",
                                          "cli/test_resume.py"], [

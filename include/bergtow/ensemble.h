@@ -17,17 +17,18 @@
 // finished and sound.
 //
 // Who does what. Whoever works on a member holds a lock on members/NAME/lock, which the system releases when the
-// process ends, however it ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed
-// one need no word between them: each takes the next member that is neither finished, failed nor locked, the longest
-// first by an estimate, with a limit of wall time field by field, so that a call that is stopped leaves whole fields,
-// and within a field a Latin hypercube in the order of its conditions, so that it leaves a random sample of them.
-// (Rejected: a counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it
-// on every network.) A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are
-// removed. One whose process died is tried again after all others, and given up after some
-// attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies
-// takes all others with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members
-// are run one at a time, so that only the one at fault goes on to the limit. (Not from the first on: a job that ends
-// with its time limit leaves as many such members as it had groups.)
+// process ends, however it ends, and the lock of its result folder (src/base/lock.h): a member that a `bergtow
+// resume` is at stays open, and is waited for as for one of another call. So groups of ranks, jobs of an array on a
+// cluster, and a call that resumes a killed one need no word between them: each takes the next member that is
+// neither finished, failed nor locked, the longest first by an estimate, with a limit of wall time field by field,
+// so that a call that is stopped leaves whole fields, and within a field a Latin hypercube in the order of its
+// conditions, so that it leaves a random sample of them. (Rejected: a counter in shared MPI memory; it knows nothing
+// of other jobs, and a rank that computes does not serve it on every network.) A member that was stopped goes on
+// from its checkpoint; when it is finished its checkpoints are removed. One whose process died is tried again after
+// all others, and given up after some attempts without a checkpoint between them, so that it cannot stop the rest.
+// Under mpirun a rank that dies takes all others with it, and their members have one more attempt without an end:
+// from BT_SUSPECT_ATTEMPTS on members are run one at a time, so that only the one at fault goes on to the limit.
+// (Not from the first on: a job that ends with its time limit leaves as many such members as it had groups.)
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 

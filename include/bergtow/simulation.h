@@ -160,11 +160,15 @@ const char *bt_last_error(void);
 /// bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved);
 
+/// The case of a simulation, as bt_case_check_text gives it; of one that goes on, that of its checkpoint. Release with
+/// bt_release.
+char *bt_simulation_case(const bt_simulation *s);
+
 /// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json); NULL for another word. Release
 /// with bt_release.
 char *bt_list_json(const char *what);
 
-/// Release a text that bt_case_check_text or bt_list_json has given. NULL is ignored.
+/// Release a text that one of these three has given. NULL is ignored.
 void bt_release(char *text);
 
 /// "0.1.0"

@@ -95,7 +95,8 @@ class Simulation:
     def _look(self, case: Case | None) -> None:
         """What stays as it is."""
         address = self._s
-        self.case = case if case is not None else Case(os.path.join(self.folder or "", "case.resolved.yml"))
+        self._case = case
+        self._resolved = _library.take_text(self._library.bt_simulation_case(address))
         towed = self._library.bt_simulation_towed(address)
         self.has_towed: bool = towed >= 0
         self._towed = towed if self.has_towed else None
@@ -109,6 +110,14 @@ class Simulation:
         if self._process != os.getpid():
             raise BergtowError("the simulation is of the process that this one is a fork of; begin one here")
         return self._address
+
+    @property
+    def case(self) -> Case:
+        """The case that is simulated; of a run that goes on, as its checkpoint has it. It is made when it is asked for:
+        files that it names, which a run that goes on does not need, must be there by then."""
+        if self._case is None:
+            self._case = Case(os.path.join(self.folder or "", "case.resolved.yml"), text=self._resolved)
+        return self._case
 
     @property
     def towed(self) -> int:

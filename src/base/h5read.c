@@ -153,3 +153,48 @@ void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int
     if (d >= 0) H5Dclose(d);
     if (!good) fail(r, name);
 }
+
+enum { LONGEST_TEXT = 1 << 28 }; // far beyond any case: what a file claims is not asked of the memory
+
+/// Room for one text of a type with a length of its own; NULL where it is none.
+static char *room_for(hid_t type, hid_t space)
+{
+    const bool one = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+                     H5Sget_simple_extent_npoints(space) == 1 && H5Tget_size(type) < LONGEST_TEXT;
+    return one ? bt_alloc(H5Tget_size(type) + 1, 1) : NULL;
+}
+
+/// The end of a reading: a text that has not been read is none.
+static char *read_or_not(char *text, bool read)
+{
+    if (read) return text;
+    free(text);
+    return NULL;
+}
+
+char *bt_h5_read_text(bt_h5_reader *r, const char *name)
+{
+    if (r->status != BT_OK) return NULL;
+    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), type = d < 0 ? -1 : H5Dget_type(d),
+                space = d < 0 ? -1 : H5Dget_space(d);
+    char *text = room_for(type, space);
+    text = read_or_not(text, text && H5Dread(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) >= 0);
+    if (space >= 0) H5Sclose(space);
+    if (type >= 0) H5Tclose(type);
+    if (d >= 0) H5Dclose(d);
+    if (!text) fail(r, name);
+    return text;
+}
+
+char *bt_h5_read_word(bt_h5_reader *r, const char *name)
+{
+    if (r->status != BT_OK || H5Aexists_by_name(r->file, "/", name, H5P_DEFAULT) <= 0) return NULL;
+    const hid_t a = H5Aopen_by_name(r->file, "/", name, H5P_DEFAULT, H5P_DEFAULT), type = a < 0 ? -1 : H5Aget_type(a),
+                space = a < 0 ? -1 : H5Aget_space(a);
+    char *text = room_for(type, space);
+    text = read_or_not(text, text && H5Aread(a, type, text) >= 0);
+    if (space >= 0) H5Sclose(space);
+    if (type >= 0) H5Tclose(type);
+    if (a >= 0) H5Aclose(a);
+    return text;
+}

@@ -31,8 +31,9 @@ static void tell_holder(int fd, const char *dir, bt_errors *err)
                   *who ? who : "it has not said who");
 }
 
-int bt_lock_take(const char *dir, bt_errors *err)
+int bt_lock_take(const char *dir, bool *busy, bt_errors *err)
 {
+    if (busy) *busy = false;
     char *path = bt_file_join(dir, "run.lock");
     int fd = -1;
     for (bool taken = false; !taken;) {
@@ -43,6 +44,7 @@ int bt_lock_take(const char *dir, bt_errors *err)
         }
         // a file system without locks has to do without
         if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno != ENOLCK && errno != EOPNOTSUPP && errno != ENOSYS) {
+            if (busy) *busy = errno == EWOULDBLOCK;
             tell_holder(fd, dir, err);
             close(fd);
             fd = -1;

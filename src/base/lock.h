@@ -6,8 +6,9 @@
 #include "bergtow/base.h"
 
 /// Take dir/run.lock, which names host and process; the system lifts it when the process ends, however. Returns a
-/// descriptor for bt_lock_drop, −1 with a message when another process has it or it cannot be made.
-int bt_lock_take(const char *dir, bt_errors *err);
+/// descriptor for bt_lock_drop, −1 with a message when another process has it or it cannot be made. *busy: another
+/// process has it, which passes; or NULL.
+int bt_lock_take(const char *dir, bool *busy, bt_errors *err);
 void bt_lock_drop(const char *dir, int lock);
 
 #endif

@@ -9,6 +9,8 @@
 
 #include "base/checksum.h"
 
+#define ITSELF "case" // no key has this name: all have a section
+
 const char *bt_case_file(const bt_case *c, const bt_key *k)
 {
     const char *file = NULL;
@@ -40,6 +42,59 @@ char *bt_case_digests(const bt_case *c)
     return bt_text_end(&t);
 }
 
+/// Length of a line with its end.
+static size_t line_length(const char *line)
+{
+    const size_t n = strcspn(line, "\n");
+    return n + (line[n] == '\n');
+}
+
+/// The comment line of a name in a text, NULL = none.
+static const char *comment_in(const char *text, const char *name)
+{
+    char *comment = bt_text_of("# %s", name);
+    const char *said = bt_case_said_of(text, comment), *line = said ? said - strlen(comment) - 2 : NULL;
+    free(comment);
+    return line;
+}
+
+char *bt_case_digests_in(const bt_case *c, const char *text)
+{
+    bt_text t;
+    bt_text_begin(&t);
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const char *line = bt_case_file(c, &bt_case_keys[k]) ? comment_in(text, bt_case_keys[k].name) : NULL;
+        if (line) fprintf(t.out, "%.*s\n", (int)strcspn(line, "\n"), line);
+    }
+    return bt_text_end(&t);
+}
+
+char *bt_case_with_digests(const char *resolved, const char *digests)
+{
+    char digest[BT_CHECKSUM_DIGEST];
+    const size_t n = strlen(resolved), head = line_length(resolved);
+    bt_checksum_digest_text(resolved, n, digest);
+    return bt_text_of("%.*s# " ITSELF ": %zu bytes, xxh128 %s\n%s%s", (int)head, resolved, n, digest, resolved + head,
+                      digests ? digests : "");
+}
+
+/// Is a text what bt_case_with_digests has made, but for comments at its end? line: the comment of itself in it.
+static bool is_itself(const char *text, const char *line)
+{
+    const size_t before = (size_t)(line - text);
+    char *resolved = bt_text_of("%.*s%s", (int)before, text, line + line_length(line));
+    const long long n = strtoll(line + sizeof "# " ITSELF ":", NULL, 10);
+    bool same = n > 0 && (size_t)n <= strlen(resolved);
+    for (const char *at = same ? resolved + n : ""; *at && same; at += line_length(at))
+        same = *at == '#' || *at == '\n';
+    if (same) resolved[n] = 0;
+    char *made = bt_case_with_digests(resolved, NULL);
+    same = same && !strncmp(text, made, strlen(made));
+    free(made);
+    free(resolved);
+    return same;
+}
+
 const char *bt_case_said_of(const char *text, const char *name)
 {
     const size_t n = strlen(name);
@@ -48,22 +103,35 @@ const char *bt_case_said_of(const char *text, const char *name)
     return NULL;
 }
 
+bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *warnings, bt_errors *err)
+{
+    const char *line = comment_in(text, ITSELF);
+    if (line && is_itself(text, line)) return BT_OK;
+    if (!line) {
+        bt_errors_add(warnings, "warning: %s: nothing in it tells what it said when the run in %s began; it is taken "
+                                "as it is now", path, dir);
+        return BT_OK;
+    }
+    bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
+                       "(bergtow run)", path, dir);
+    return BT_ERR_CASE;
+}
+
 bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *warnings, bt_errors *err)
 {
     bt_status status = BT_OK;
     for (int k = 0; k < bt_n_case_keys; k++) {
-        char *now = comment_of(c, &bt_case_keys[k]), *name = bt_text_of("# %s", bt_case_keys[k].name);
-        const char *file = bt_case_file(c, &bt_case_keys[k]), *before = bt_case_said_of(c->text, name);
+        char *now = comment_of(c, &bt_case_keys[k]);
+        const char *file = bt_case_file(c, &bt_case_keys[k]), *before = comment_in(c->text, bt_case_keys[k].name);
         if (now && !before) {
             bt_errors_add(warnings, "warning: %s: nothing in %s tells what it held when the run began; it is taken as "
                                     "it is now", file, dir);
-        } else if (now && strncmp(before - strlen(name) - 2, now, strlen(now))) {
+        } else if (now && strncmp(before, now, strlen(now))) {
             bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
                                "(bergtow run)", file, dir);
             status = BT_ERR_CASE;
         }
         free(now);
-        free(name);
     }
     return status;
 }

@@ -5,7 +5,7 @@
 // frames, the events, the collisions and the summary of the run that was never stopped, on any number of ranks and
 // threads. Only wall times, and the counts of what the division among ranks has cost, are those of the pieces. A run
 // that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given,
-// unless a file that this names has changed (src/case/case_files.h).
+// unless that or a file that it names has changed (src/case/case_files.h).
 //
 // The file. DIR/checkpoint.h5 is an HDF5 file protected by a checksum (src/base/checksum.h), of named arrays
 // (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp, brought to the disk, the one

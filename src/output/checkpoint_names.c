@@ -20,6 +20,7 @@ static const row rows[] = {
     {"about/command_line", NULL, "command line of the run", "one"},
     {"about/case_as_given", NULL, "the case file as it was given, with a document of what was set", "one"},
     {"about/case_path", NULL, "path of the case file", "one"},
+    {"about/run", NULL, "identity of the run: digest of its case, its tables and its ice", "one"},
     {"about/ranks", "1", "MPI ranks of the run", "one"},
     {"about/threads", "1", "threads of each rank", "one"},
     {"clock/phases", "s", "wall time of each phase of the steps", "phase"},

@@ -18,6 +18,7 @@
 #include "output/checkpoint.h"
 #include "base/fileio.h"
 #include "base/provenance.h"
+#include "case/case_files.h"
 #include "output/folder.h"
 #include "output/record_parts.h"
 #include "output/summary_keys.h"
@@ -134,7 +135,7 @@ static bt_status prepare_dir(const bt_record *r, const char *resolved, const cha
 {
     bt_status status = bt_file_make_dir(r->dir, err);
     if (status == BT_OK && fresh) {
-        char *text = bt_text_of("%s%s", resolved, digests ? digests : "");
+        char *text = bt_case_with_digests(resolved, digests);
         status = bt_folder_replace(r->dir, text, err);
         free(text);
     } else if (status == BT_OK) {
@@ -241,11 +242,9 @@ void bt_record_flush(bt_record *r)
 /// Move the merged steps to the buffer as one entry.
 static void end_entry(bt_record *r)
 {
-    for (int k = 0; k < r->n_series; k++) {
-        double value = r->merged[k];
-        if (bt_series(k)->keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
-        r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
-    }
+    for (int k = 0; k < r->n_series; k++)
+        r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] =
+            bt_record_merged(bt_series(k)->keep, r->merged[k], r->n_merged);
     r->buffered++;
     r->n_merged = 0;
     bt_impact_store_end_sample(&r->impacts);
@@ -261,12 +260,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
         const bt_quantity *q = bt_series(k);
         double *m = &r->merged[k];
         const double x = bt_sample_value(s, q);
-        switch (r->n_merged ? q->keep : BT_KEEP_LAST) {
-        case BT_KEEP_LAST: *m = x; break;
-        case BT_KEEP_MEAN:
-        case BT_KEEP_SUM: *m += x; break;
-        case BT_KEEP_MAX: *m = bt_max_seen(*m, x); break;
-        }
+        *m = r->n_merged ? bt_record_merge(q->keep, *m, x) : x;
     }
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
     if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS))

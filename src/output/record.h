@@ -194,6 +194,10 @@ bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, co
 bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
                            const bt_record_bodies *b, const char *command_line, bt_errors *err);
 
+/// After either: the identity of the run (record_run.c) goes to the file, and to the checkpoints of this record.
+/// identity: on rank 0. The status is that of rank 0: agree on it.
+bt_status bt_record_identify(bt_record *r, const char *identity, bt_errors *err);
+
 struct bt_snapshot;
 
 /// Where the record stands, on rank 0; all it has taken is in the file then. n_frames: of those taken, how many belong
@@ -205,8 +209,9 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, 
 bt_status bt_record_publish(bt_record *r, bt_errors *err);
 
 /// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from
-/// result.h5, which may hold more by now; events from e. Then the summary is removed. After bt_record_reopen and
-/// bt_record_watch_impacts. Errors: BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
+/// result.h5, which may hold more by now; events from e. Then case.resolved.yml is made good, and the summary removed.
+/// After bt_record_reopen, bt_record_identify and bt_record_watch_impacts. Errors: BT_ERR_CASE (result.h5 is damaged,
+/// of another run, or holds less), BT_ERR_IO.
 bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e, bt_errors *err);
 
 /// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left

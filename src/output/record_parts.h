@@ -4,6 +4,8 @@
 #define BT_RECORD_PARTS_H
 
 #include "output/frames.h"
+#include "base/checksum.h"
+#include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/impact_store.h"
 #include "output/summary.h"
@@ -18,6 +20,7 @@ struct bt_record {
     char *dir;
     const bt_case *c;
     const bt_comm *comm;
+    char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_run.c)
     bool fresh;            ///< a new run, in place of what the folder held
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
@@ -47,6 +50,30 @@ char *bt_record_xdmf(const bt_record *r);
 
 /// A file of the folder goes, if it is there.
 bt_status bt_record_remove(const bt_record *r, const char *name, bt_errors *err);
+
+/// The next step of an entry: m of those before, x its own.
+static inline double bt_record_merge(bt_keep keep, double m, double x)
+{
+    return keep == BT_KEEP_LAST ? x : keep == BT_KEEP_MAX ? bt_max_seen(m, x) : m + x;
+}
+
+/// The entry of n steps.
+static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
+{
+    return keep == BT_KEEP_MEAN ? m / (double)n : m;
+}
+
+#define BT_RECORD_IDENTITY "about/run" // in a checkpoint
+
+/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
+/// the first n entries x of series k.
+void bt_record_check_run(bt_record *r, bt_snapshot *s, bt_h5_reader *old);
+void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
+                            bt_h5_reader *old);
+
+/// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
+/// of it. Errors: BT_ERR_IO.
+bt_status bt_record_keep_case(const bt_record *r, bt_errors *err);
 
 /// A text file of the folder.
 bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err);

@@ -28,6 +28,7 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
     for (int k = 0; k < h->n_columns; k++)
         bt_snapshot_add(s, bt_history_name(k, name), BT_ITEM_F64, h->n, 1, h->column[k]);
+    if (*r->identity) bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
@@ -141,7 +142,7 @@ static double missing_value(int k)
 }
 
 /// Entries 0 up to n of all series.
-static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
+static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < r->n_series && old->status == BT_OK; k++) {
@@ -150,6 +151,7 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
         if (maybe && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = missing_value(k);
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
+        if (old->status == BT_OK) bt_record_check_series(r, k, x, n, s, old);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
@@ -266,9 +268,10 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     if (first) {
         load_history(&r->history, s, step);
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
+        if (!s->faulty && old.status == BT_OK) bt_record_check_run(r, s, &old);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
+        if (!s->faulty && old.status == BT_OK) load_series(r, s, &old, entries);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
-        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);
         bt_record_events(r, e, err);
     }
     bt_status status = bt_comm_agree(r->comm, s->faulty                      ? BT_ERR_CASE
@@ -278,6 +281,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     bt_h5_end(&old);
     if (status == BT_OK && first) bt_record_flush(r);
     if (status == BT_OK) status = r->h5.status;
+    if (status == BT_OK && first) status = bt_record_keep_case(r, err);
     if (status == BT_OK && first) status = bt_record_remove(r, "summary.json", err); // of an end that is none any more
     free(path);
     return bt_comm_agree(r->comm, status);

@@ -23,6 +23,7 @@
 #include "run/study_axes.h"
 #include "base/fileio.h"
 #include "base/launcher.h"
+#include "base/lock.h"
 
 // Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
 #define GATHER_SECONDS 1.0
@@ -78,22 +79,35 @@ static bool may_take_suspects(bt_ensemble *e)
     return e->alone >= 0;
 }
 
-/// Make the folder of a member and take its lock; −1: somebody is at it, or it has failed by that.
-static int lock_member(bt_ensemble *e, bt_entry *x)
+static void drop_member(bt_ensemble *e, const bt_entry *x)
+{
+    bt_lock_drop(x->folder, e->run_lock);
+    if (e->lock >= 0) close(e->lock);
+    e->lock = e->run_lock = -1;
+}
+
+/// Make the folder of a member and take its locks; false: somebody is at it, an ensemble or a `bergtow resume`, or it
+/// has failed by that.
+static bool lock_member(bt_ensemble *e, bt_entry *x)
 {
     bt_errors why = {0};
     bt_status status = bt_file_make_dir(x->folder, &why);
-    const int fd = status == BT_OK ? bt_member_open(x->folder, "lock", O_RDWR | O_CREAT) : -1;
-    if (status == BT_OK && fd < 0) status = bt_file_fail(x->folder, "make a lock in the folder", errno, &why);
+    x->busy = false;
+    e->run_lock = -1;
+    e->lock = status == BT_OK ? bt_member_open(x->folder, "lock", O_RDWR | O_CREAT) : -1;
+    if (status == BT_OK && e->lock < 0) status = bt_file_fail(x->folder, "make a lock in the folder", errno, &why);
+    if (status == BT_OK && bt_member_take_lock(e->lock, false) &&
+        (e->run_lock = bt_lock_take(x->folder, &x->busy, &why)) < 0 && !x->busy)
+        status = BT_ERR_IO;
     if (status != BT_OK) {
         settle_failed(e, x, status, &why);
         bt_ensemble_journal(e, "failed", &x->m, 0, (int)status);
         bt_ensemble_say(e, x, status, 0);
     }
     bt_errors_free(&why);
-    if (fd < 0 || bt_member_take_lock(fd, false)) return fd;
-    close(fd);
-    return -1;
+    if (e->run_lock >= 0) return true;
+    drop_member(e, x);
+    return false;
 }
 
 /// With a limit of steps each group has members of its own: one that has paused looks like one that waits.
@@ -113,15 +127,10 @@ static int64_t claim(bt_ensemble *e)
         bt_entry *x = &e->list[i];
         bt_entry_look(x);
         if (x->settled || is_for_another(e, x) || (bt_entry_is_suspect(x) && !may_take_suspects(e))) continue;
-        const int fd = lock_member(e, x);
-        if (fd < 0) continue;
+        if (!lock_member(e, x)) continue;
         bt_entry_look(x); // it may have been finished between the look and the lock
-        if (x->settled) {
-            close(fd);
-            continue;
-        }
-        e->lock = fd;
-        return i;
+        if (!x->settled) return i;
+        drop_member(e, x);
     }
     return NONE;
 }
@@ -190,7 +199,8 @@ static bt_status run_member(bt_ensemble *e, bt_entry *x)
                                   .max_steps = e->o->max_steps,
                                   .max_wall = e->o->max_wall > 0 ? bt_max(1e-3, bt_ensemble_wall_left(e)) : 0,
                                   .stop_signal = &stop_signal,
-                                  .command_line = e->o->command_line};
+                                  .command_line = e->o->command_line,
+                                  .held = true};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
     }
@@ -227,7 +237,7 @@ static bt_status work(bt_ensemble *e)
         if (i == NONE) return e->lost > 0 ? BT_ERR_IO : BT_OK;
         const bt_status status = run_member(e, &e->list[i]);
         if (e->group->rank == 0) {
-            close(e->lock);
+            drop_member(e, &e->list[i]);
             if (status != BT_ERR_SIGNAL &&
                 bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE))
                 gather(e, false);

@@ -19,6 +19,7 @@ typedef struct bt_entry {
     /// sample: those that are done are to be one, too, and the costly ones alone have another mean
     double first;
     bool settled;  ///< finished or failed, as far as this process knows
+    bool busy;     ///< a run of another kind (bergtow resume) had the folder when this process wanted it
     bool paused;   ///< has done the steps that this call was to do
     int attempts;  ///< starts without an end
 } bt_entry;
@@ -32,7 +33,8 @@ typedef struct bt_ensemble {
     double cost_before; ///< of those
     double most_floes;  ///< of the member with the most
     int64_t fixed;      ///< conditions whose ice does not depend on the seed
-    int n_groups, of_group, threads, jobs, lock; ///< lock: descriptor held for the member at hand
+    int n_groups, of_group, threads, jobs;
+    int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/lock.h)
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded

@@ -72,7 +72,7 @@ static bt_status tell_member(bt_ensemble *e, const bt_entry *x, counts *n, bt_er
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
         n->left++;
-        n->at_work += bt_member_held(x->folder);
+        n->at_work += x->busy || bt_member_held(x->folder);
     }
     free(why);
     bt_errors_free(&damage);

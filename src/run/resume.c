@@ -35,7 +35,7 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
         bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", o->dir);
         return BT_ERR_IO;
     }
-    if ((k->lock = bt_lock_take(o->dir, err)) < 0) return BT_ERR_IO;
+    if (!o->held && (k->lock = bt_lock_take(o->dir, NULL, err)) < 0) return BT_ERR_IO;
     bt_folder_recover(o->dir);
     k->fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
                !bt_file_there(o->dir, "summary.json");
@@ -48,12 +48,24 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
     return status;
 }
 
+/// Rank 0. Before the case is read: what is wrong in one that was edited is of no concern.
+static bt_status check_itself(const char *path, const char *dir, bt_errors *warnings, bt_errors *err)
+{
+    char *text = NULL;
+    size_t size = 0;
+    bt_status status = bt_file_read(path, "a case", &text, &size, err);
+    if (status == BT_OK) status = bt_case_itself_same(path, text, dir, warnings, err);
+    free(text);
+    return status;
+}
+
 /// Collective. The case that the run began with, at time zero, and the files that it names.
 static bt_status start_again(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
 {
     char *path = bt_file_join(o->dir, "case.resolved.yml");
     bt_errors warnings = {0};
-    bt_status status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
+    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, o->dir, &warnings, err) : BT_OK);
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
     if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&k->c, o->dir, &warnings, err);
     status = bt_comm_agree(comm, status);
     bt_errors_print(&warnings);

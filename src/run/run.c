@@ -80,7 +80,8 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run
     int64_t failed;
     const bt_status status = run_case(comm, c, o, &m, &failed, err);
     if (failed >= 0) bt_run_keep_failure(comm, c, o, failed, start, err);
-    if (status != BT_OK && m.lock >= 0 && bt_folder_keeps(o->dir))
+    const bool taken = m.lock >= 0 || (o->held && comm->rank == 0);
+    if (status != BT_OK && taken && bt_folder_keeps(o->dir))
         bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", o->dir, o->dir,
                       BT_FOLDER_REPLACED);
     bt_lock_drop(o->dir, m.lock);

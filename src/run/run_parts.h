@@ -21,6 +21,7 @@ typedef struct bt_running {
     const bt_run_options *o;
     bt_world *w;
     char *digests;           ///< of the files that the case names (case/case_files.h); on rank 0 of a fresh run
+    char *identity;          ///< of the run (bt_running_identity); on rank 0
     bt_field field;          ///< at time zero, with the lead in it; on rank 0, for the checkpoints
     bt_roster roster;
     bt_record *record;       ///< NULL: the run leaves no files
@@ -79,6 +80,11 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_er
 
 /// Collective. Publish the record and write a checkpoint of this name.
 bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err);
+
+/// What tells a run from others: a digest of what it begins with, the resolved case, the tables of current and wind and
+/// the ice as made. Those of the same case are alike, and may take each other's place. kept: the checkpoint, which has
+/// it unless an earlier version wrote it, or NULL. The caller frees it.
+char *bt_running_identity(const bt_case *c, const bt_field *f, bt_snapshot *kept);
 
 /// Time between frames, s.
 double bt_running_frame_interval(const bt_case *c);

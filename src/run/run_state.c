@@ -8,6 +8,7 @@
 
 #include "output/checkpoint.h"
 #include "partition/domain.h"
+#include "base/checksum.h"
 #include "base/largest.h"
 #include "revision.h"
 #include "run/run_parts.h"
@@ -49,6 +50,32 @@ static void save_case(const bt_case *c, bt_snapshot *s)
     bt_snapshot_add(s, "case/current", BT_ITEM_F64, c->water.table.n, 3, c->water.table.row);
     bt_snapshot_add(s, "case/wind", BT_ITEM_F64, c->air.table.n, 3, c->air.table.row);
     free(text);
+}
+
+static void add_digest(bt_text *t, const void *numbers, int64_t n)
+{
+    char digest[BT_CHECKSUM_DIGEST];
+    bt_checksum_digest_text(numbers, (size_t)n * sizeof(double), digest);
+    fprintf(t->out, "%s\n", digest);
+}
+
+char *bt_running_identity(const bt_case *c, const bt_field *f, bt_snapshot *kept)
+{
+    if (kept && bt_snapshot_find(kept, "about/run")) return bt_text_copy(bt_snapshot_text(kept, "about/run"));
+    char *resolved = bt_case_resolved(c), digest[BT_CHECKSUM_DIGEST];
+    bt_text t;
+    bt_text_begin(&t);
+    fputs(resolved, t.out);
+    add_digest(&t, c->water.table.row, 3 * c->water.table.n);
+    add_digest(&t, c->air.table.row, 3 * c->air.table.n);
+    add_digest(&t, f->vertices, f->n > 0 ? 2 * f->offsets[f->n] : 0);
+    add_digest(&t, f->pose, 3 * (int64_t)f->n);
+    add_digest(&t, f->thickness, f->n);
+    char *text = bt_text_end(&t);
+    bt_checksum_digest_text(text, strlen(text), digest);
+    free(text);
+    free(resolved);
+    return bt_text_copy(digest);
 }
 
 bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err)

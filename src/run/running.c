@@ -70,7 +70,9 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     free(r->roster.thickness); // result.h5 has it
     r->roster.thickness = NULL;
     if (status != BT_OK) return status;
-    if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    status = bt_comm_agree(r->comm, bt_record_identify(r->record, r->identity, err));
+    if (status == BT_OK && r->w->impacts)
+        status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
     if (status != BT_OK) bt_record_abandon(r->record);
     return status;
@@ -118,14 +120,14 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
     *f = (bt_field){0};
 }
 
-/// Collective. The folder is this call's alone. *lock: on rank 0.
-static bt_status take_folder(const bt_comm *comm, const char *dir, int *lock, bt_errors *err)
+/// Collective. The folder is this call's alone, or has been its caller's. *lock: on rank 0.
+static bt_status take_folder(const bt_comm *comm, const char *dir, bool held, int *lock, bt_errors *err)
 {
     bt_status status = BT_OK;
     *lock = -1;
     if (comm->rank == 0) {
         status = bt_file_make_dir(dir, err);
-        if (status == BT_OK && (*lock = bt_lock_take(dir, err)) < 0) status = BT_ERR_IO;
+        if (status == BT_OK && !held && (*lock = bt_lock_take(dir, NULL, err)) < 0) status = BT_ERR_IO;
         if (status == BT_OK) bt_folder_recover(dir);
     }
     return bt_comm_agree(comm, status);
@@ -172,6 +174,7 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
     status = bt_comm_agree(r->comm, status);
     if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
     if (status == BT_OK) {
+        if (r->comm->rank == 0 && r->o->dir) r->identity = bt_running_identity(r->c, &f, kept);
         keep_field(r, &f, &lead, threads);
         if (kept) {
             status = bt_running_load(r, kept, err);
@@ -219,7 +222,7 @@ bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c,
     if (r->halt.first && o->dir && !m->kept) r->digests = bt_case_digests(c);
     bt_status status = set_up(r, m->kept, err);
     // Only now: a case that is refused leaves nothing behind.
-    if (status == BT_OK && o->dir && !m->held) status = take_folder(comm, o->dir, &m->lock, err);
+    if (status == BT_OK && o->dir && !m->held) status = take_folder(comm, o->dir, o->held, &m->lock, err);
     if (status != BT_OK) return status;
     bt_halt_begin(&r->halt); // before the record, which says to whoever looks that the run has begun
     if (o->dir) status = open_record(r, m->kept, err);
@@ -481,5 +484,6 @@ bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
     bt_roster_free(&r->roster);
     bt_world_free(r->w);
     free(r->digests);
+    free(r->identity);
     return status;
 }

@@ -462,6 +462,8 @@ bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved)
     return reported(status, &err);
 }
 
+char *bt_simulation_case(const bt_simulation *s) { return bt_case_resolved(&s->c); }
+
 char *bt_list_json(const char *what)
 {
     const bool keys = !strcmp(what, "keys");

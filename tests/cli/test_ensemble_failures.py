@@ -2,6 +2,7 @@
 """What a member can die of: a bad value, a full disk, a dead rank. It is named, up to the report, and the rest
 complete."""
 import errno
+import fcntl
 import json
 import os
 import re
@@ -17,8 +18,8 @@ import numpy as np
 import pytest
 
 import faults
-from harness import (BERGTOW, CASE, DONE, IO, NUMERIC, RANK, TOW, call, changed, differing, environment, launcher,
-                     write_case)
+from harness import (BERGTOW, CASE, DONE, IO, NUMERIC, RANK, SIGNAL, TOW, call, changed, differing, environment,
+                     launcher, write_case)
 from resuming import children, started
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
@@ -291,3 +292,23 @@ def test_a_base_case_that_one_rank_cannot_read(tmp_path):
     words = [*launcher(2), "sh", "-c", stale + rank, BERGTOW, "ensemble", tmp_path / "study.yml", "-o", "all"]
     result = faults.started(words, env, tmp_path)
     assert result.returncode == IO and "base.yml: cannot" in result.stderr and "Stale file" in result.stderr, result
+
+
+def test_a_member_that_another_run_is_at_stays_open(tmp_path):
+    """A `bergtow resume` of it: with --no-wait the call ends with 6 and records no failure, without it waits."""
+    prepare(tmp_path)
+    assert ensemble(tmp_path, "--steps", 3).returncode == SIGNAL
+    member = tmp_path / "all/members/c002-r001"
+    run_lock = open(member / "run.lock", "w")  # as src/base/lock.c has it
+    fcntl.flock(run_lock, fcntl.LOCK_EX)
+    result = ensemble(tmp_path, "--no-wait")
+    assert result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr, result
+    assert not (member / "failed.txt").exists() and statuses(tmp_path)["c002-r001"] == 0
+    assert "2 members finished, 0 failed, 1 left" in result.stdout
+    waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                               env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
+    assert any("waiting for 1 members" in line for line in waiting.stdout)
+    run_lock.close()
+    out = waiting.communicate(timeout=60)[0]
+    assert waiting.returncode == DONE and "3 members finished, 0 failed, 0 left" in out
+    assert "failed" not in {j["event"] for j in journal(tmp_path)}

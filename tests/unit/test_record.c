@@ -118,13 +118,19 @@ static void bodies_case_and_provenance_are_there(void **state)
     assert_true(H5Tget_size(ct) < sizeof fixed && H5Dread(c, ct, H5S_ALL, H5S_ALL, H5P_DEFAULT, fixed) >= 0);
     assert_string_equal(fixed, "run: {dt: 0.1 s}\n");
     H5Dclose(c);
-    char *resolved = slurp(in_folder("a/case.resolved.yml"));
+    const bt_case made = made_up_case();
+    char *resolved = bt_case_resolved(&made), *file = slurp(in_folder("a/case.resolved.yml"));
     const hid_t r = H5Dopen2(f, "/case", H5P_DEFAULT), rt = H5Dget_type(r);
     char *stored = calloc(1, H5Tget_size(rt) + 1);
     assert_true(H5Dread(r, rt, H5S_ALL, H5S_ALL, H5P_DEFAULT, stored) >= 0);
     assert_string_equal(stored, resolved);
+    // the same but for its digest, which is a comment
+    const char *comment = strstr(file, "\n# case: "), *rest = comment ? strchr(comment + 1, '\n') : NULL;
+    assert_true(rest && !strncmp(file, resolved, (size_t)(comment - file)));
+    assert_string_equal(rest, resolved + (comment - file));
     free(stored);
     free(resolved);
+    free(file);
     H5Dclose(r);
 
     static const char *const wanted[] = {"version", "revision", "compiler", "flags", "host", "start_time", "libraries"};
