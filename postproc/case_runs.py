@@ -6,8 +6,7 @@ What converge.py and capability.py decide from.
                                 begun.json in place of it while the run is under way or stopped
 
 A run is kept, and one that was stopped goes on, while the case file, the files that it names, the program and the
-values are what they were. One call at a time works in DIR/SUBJECT: it
-and its runs hold the lock of the folder.
+values are what they were. One call at a time works in DIR/SUBJECT: it and its runs hold the lock of the folder.
 """
 import argparse
 import errno
