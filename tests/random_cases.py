@@ -286,8 +286,7 @@ class Scene:
         if law == "power":
             v["ice.size_min"], v["ice.size_max"], v["ice.size_exponent"] = size * d.flat(0.4, 0.8), size * d.flat(
                 1, 1.8), d.flat(0.5, 4)
-            if self.ends != "moving":
-                del v["ice.size"] # without effect, and refused
+            del v["ice.size"] # without effect, and refused
         elif d.chance(0.7):
             v["ice.size_spread"] = d.flat(0, 0.4)
         self.choose("ice.thickness_law")

@@ -39,7 +39,7 @@ PATIENCE = 180
 #: attributes of result.h5 that depend on program, machine, clock or layout: they must be there, as machine_keys of the
 #: summary
 PROVENANCE = {"version", "ranks", "threads", "command_line", "compiler", "flags", "host", "libraries", "revision",
-              "start_time", "wall_time"}
+              "start_time", "wall_time", "run"}  # the last: digest of a case that has the paths of its files
 
 SHORT = changed(TOW, run__duration=4, output=None)
 DENSE = changed(TOW, run__duration=4, output=None, ice__concentration=0.75, ice__size=0.9)

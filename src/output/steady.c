@@ -154,12 +154,14 @@ static double led_after(const bt_history *h, const bt_case *c, double time)
 
 #define COURSE_LEFT 0.1 // rad of a turn that is left where the body counts as being on its new course, assumed
 
+static double half_tan(double angle) { return bt_sin(0.5 * angle) / bt_cos(0.5 * angle); }
+
 /// Way of the end from a turn until the body on its line has followed, m. The angle θ between body and end goes down as
 /// tan θ/2 ~ exp(−s/L) (a tractrix); a line's length at least.
 static double followed_in(const bt_case *c, double turn)
 {
     if (c->tow.mode == BT_TOW_SPEED) return 0;
-    return c->tow.line_length * bt_max(1, bt_log(tan(0.5 * bt_min(turn, 3)) / tan(0.5 * COURSE_LEFT)));
+    return c->tow.line_length * bt_max(1, bt_log(half_tan(bt_min(turn, 3)) / half_tan(COURSE_LEFT)));
 }
 
 /// When way-point k was passed, s; NaN = not yet.
