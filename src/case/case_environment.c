@@ -139,16 +139,16 @@ void bt_case_warn_tables(const bt_case *c, bt_errors *warnings)
 // The lead is cut at time zero and goes with the ice, the planned path does not.
 void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings)
 {
+    if (c->lead.mode == BT_LEAD_NONE) return;
     const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
-    const double aside = c->tow.n_waypoints > 0 ? bt_hypot(x, y) : fabs(y * ux - x * uy),
-                 cut = c->lead.mode == BT_LEAD_NONE ? 0 : bt_case_tow_cut(c);
+    const double aside = c->tow.n_waypoints > 0 ? bt_hypot(x, y) : fabs(y * ux - x * uy), cut = bt_case_tow_cut(c);
     if (cut > 0.5 * c->lead.width)
         bt_errors_add(warnings,
                       "lead.width: on its line the body cuts the corners of the way by up to %.3g m, more than half "
                       "the width of the lead, %g m, which follows the way-points: it leaves the lead there; take a "
                       "wider lead, a shorter line, or move the corner",
                       cut, c->lead.width);
-    if (c->lead.mode == BT_LEAD_NONE || !(aside > 0.5 * c->lead.width)) return;
+    if (!(aside > 0.5 * c->lead.width)) return;
     bt_errors_add(warnings,
                   "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width "
                   "of the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",

@@ -46,6 +46,9 @@ static bool within(const bt_bodies *b, bt_idx i, double x, double y)
 static void add_overtaken(bt_stall *s, const bt_world *w)
 {
     const bt_tow *t = w->tow;
+    bool fast = false;
+    for (int k = 0; k < t->n_branches; k++) fast = fast || !t->branch[k].broken;
+    if (!fast) return; // adrift
     const bool in = within(&w->bodies, bt_world_towed(w), t->carriage_x - t->travel_x, t->carriage_y - t->travel_y);
     s->outside = s->outside || !in;
     if (!in || !s->outside) return; // a line fastened amidships may begin within

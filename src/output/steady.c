@@ -255,12 +255,13 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 static double come_on(const bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
 {
     const double *t = h->column[BT_COL_TIME], *vx = h->column[BT_COL_VX], *vy = h->column[BT_COL_VY];
-    double way = 0, ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
+    double way = 0, ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction), passed = passed_at(totals, 0);
     int leg = 0;
     for (int64_t i = s->first + 1; i < h->n; i++) {
-        for (; leg + 1 < c->tow.n_waypoints && passed_at(totals, leg) <= t[i]; leg++) {
+        while (leg + 1 < c->tow.n_waypoints && passed <= t[i]) {
             const double *p = c->tow.waypoints + 2 * leg, course = bt_atan2(p[3] - p[1], p[2] - p[0]);
             ux = bt_cos(course), uy = bt_sin(course);
+            passed = passed_at(totals, ++leg);
         }
         way += (vx[i] * ux + vy[i] * uy) * (t[i] - t[i - 1]);
     }

@@ -53,6 +53,17 @@ def test_a_body_that_overtakes_its_towing_end_is_reported(tmp_path):
     assert not warned(held, "within the hull") and "overtaken" not in reason(held)
 
 
+def test_a_body_adrift_overtakes_nothing(tmp_path):
+    """Its line has parted before the current carries it past the end, which pulls at it no more."""
+    tow = {k: v for k, v in LINE.items() if k not in ("speed", "ramp")}
+    case = changed(BERG, water={"current_x": 0.9}, run={"dt": 2, "duration": 1000},
+                   tow=tow | {"programme": [[0, 2], [60, 2], [70, 0.2]], "line": {"breaking_load": 1}})
+    r = run(tmp_path, case)
+    assert any(e["kind"] == "adrift" for e in r.summary["events"]), r.summary["events"]
+    assert not warned(r, "within the hull") and "overtaken" not in reason(r)
+    assert (np.abs(r.series("carriage_x") - r.series("body_x")) < 25).any()
+
+
 def test_an_end_that_begins_within_the_hull_is_no_overtaking(tmp_path):
     """A short line to the middle of a model, as from a carriage above it."""
     r = run(tmp_path, changed(BERG, tow=LINE | {"line_length": 5, "hull_x": 0, "hull_y": 0}, run__duration=200))
