@@ -139,6 +139,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     bt_gaps *g = &t->gaps[j];
     bt_limit *l = &t->laws.limits[j];
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt, *own = w->par.law_own[BT_LAW_CRUSHING];
+    const bt_mass mass = bt_mass_of(u, s->inv);
     const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
     const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
@@ -157,7 +158,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
         if (later <= bt_max(length, least)) continue; // as long as it gets
         const double k = own[BT_CRUSH_PRESSURE] * h * (later - length) / way;
         l->base[i] = bt_min(l->flat[i], per_length * length);
-        l->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * u->w[i]));
+        l->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * mass.w[i]));
     }
 }
 

@@ -112,27 +112,20 @@ static void inherit(const bt_manifold *m, const bt_held *h, bt_contact *u)
     u->lt = before == 0 ? 0 : kept == before ? h->lt : h->lt * (kept / before);
 }
 
-/// Sheets that lie on each other (contact/raft.h): components along x and y, one step length for both.
-static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt_contact *u, bt_gaps *g)
+/// Sheets that lie on each other (contact/raft.h): components along x and y.
+static void fill_sheets(const bt_manifold *m, bt_idx pair, bt_contact *u, bt_gaps *g)
 {
-    const bt_inv ia = w->bodies.inv[m->a], ib = w->bodies.inv[m->b];
     const bt_point *q = &m->p[0];
     *u = (bt_contact){
         .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0],
         .pair = pair};
     *g = (bt_gaps){0};
-    const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
-    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt,
-                 xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
-    u->w[0] = u->wt = free + 0.5 * (x + y) + sqrt(0.25 * (x - y) * (x - y) + xy * xy);
-    u->mn[0] = u->mt = 1 / u->w[0];
 }
 
 static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_held *h, bt_contact *u,
                          bt_gaps *g)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
     const double nx = m->nx, ny = m->ny;
     *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points,
                       .pair = pair};
@@ -141,20 +134,11 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
         const bt_point *q = &m->p[i];
         u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
         u->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
-        u->w[i] = ia.m + ib.m + ia.i * u->ran[i] * u->ran[i] + ib.i * u->rbn[i] * u->rbn[i];
-        u->mn[i] = 1 / u->w[i];
         g->gap[i] = q->gap;
         g->feature[i] = q->feature;
     }
     u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
     u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
-    u->wt = ia.m + ib.m + ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt;
-    u->mt = 1 / u->wt;
-    if (m->n_points > 1) {
-        u->w12 = ia.m + ib.m + ia.i * u->ran[0] * u->ran[1] + ib.i * u->rbn[0] * u->rbn[1];
-        const double det = u->w[0] * u->w[1] - u->w12 * u->w12;
-        u->per_det = det > 1e-9 * u->w[0] * u->w[1] ? 1 / det : 0;
-    }
     if (w->par.warm_start) inherit(m, h, u);
     bt_pack_bias(w, u, g, 1);
 }
@@ -207,7 +191,7 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
         const bt_idx at = next[s->colour[i]]++;
         bt_contact *u = &t->contacts[at];
         if (s->man[i].n_points == 0) {
-            fill_sheets(w, &s->man[i], s->pair[i], u, &t->gaps[at]);
+            fill_sheets(&s->man[i], s->pair[i], u, &t->gaps[at]);
             bt_laws_bound(w, t, at, p, &s->man[i]);
             continue;
         }

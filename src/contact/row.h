@@ -3,6 +3,8 @@
 #ifndef BERGTOW_ROW_H
 #define BERGTOW_ROW_H
 
+#include <math.h>
+
 #include "space/cells.h"
 
 static inline double bt_normal_velocity(const bt_contact *u, int i, const bt_vel *va, const bt_vel *vb)
@@ -13,6 +15,49 @@ static inline double bt_normal_velocity(const bt_contact *u, int i, const bt_vel
 static inline double bt_tangent_velocity(const bt_contact *u, const bt_vel *va, const bt_vel *vb)
 {
     return u->nx * (vb->y - va->y) - u->ny * (vb->x - va->x) + u->rbt * vb->w - u->rat * va->w;
+}
+
+/// Effective masses of a contact.
+typedef struct bt_mass {
+    double w[2], w12; ///< W of the normals and their coupling, 1/kg; 0 for a point that is not there
+    double mn[2];     ///< 1/W, kg; 0 for the second of one point
+    double per_det;   ///< 1/(W1 W2 − W12²), kg²; 0 when singular or one point
+    double wt, mt;    ///< W of the tangent and its inverse
+} bt_mass;
+
+/// W of arms p and q on body a with the inverse masses ia, and of r and s on b.
+static inline double bt_coupling(bt_inv ia, bt_inv ib, double p, double q, double r, double s)
+{
+    return ia.m + ib.m + ia.i * p * q + ib.i * r * s;
+}
+
+/// Sheets that lie on each other (contact/raft.h): one step length for the components along x and y.
+static inline bt_mass bt_mass_of_sheets(const bt_contact *u, bt_inv ia, bt_inv ib)
+{
+    const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
+    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt,
+                 xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
+    const double w = free + 0.5 * (x + y) + sqrt(0.25 * (x - y) * (x - y) + xy * xy);
+    return (bt_mass){.w = {w}, .mn = {1 / w}, .wt = w, .mt = 1 / w};
+}
+
+/// Always by these expressions, or by the same four at a time (solve/rows.h): bits are the same wherever it is formed.
+static inline bt_mass bt_mass_of(const bt_contact *u, const bt_inv *inv)
+{
+    const bt_inv ia = inv[u->a], ib = inv[u->b];
+    if (u->n == 0) return bt_mass_of_sheets(u, ia, ib);
+    bt_mass m = {0};
+    for (int i = 0; i < u->n; i++) {
+        m.w[i] = bt_coupling(ia, ib, u->ran[i], u->ran[i], u->rbn[i], u->rbn[i]);
+        m.mn[i] = 1 / m.w[i];
+    }
+    m.wt = bt_coupling(ia, ib, u->rat, u->rat, u->rbt, u->rbt);
+    m.mt = 1 / m.wt;
+    if (u->n == 1) return m;
+    m.w12 = bt_coupling(ia, ib, u->ran[0], u->ran[1], u->rbn[0], u->rbn[1]);
+    const double det = m.w[0] * m.w[1] - m.w12 * m.w12;
+    m.per_det = det > 1e-9 * m.w[0] * m.w[1] ? 1 / det : 0;
+    return m;
 }
 
 /// Add impulses to both velocities: normal total jn = Σ λ, its moments Σ λ ra×n and Σ λ rb×n, tangential jt.

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "solve/kernel.h"
-#include "solve/vector.h"
+#include "solve/rows.h"
 
 enum { LANES = BT_LANES, OPEN = 8 }; // OPEN: batches that wait for more contacts, when a cell is packed
 
@@ -17,18 +17,24 @@ typedef bt_mask mask;
 
 typedef enum { RIGID, BOUNDED, SHEETS, PROJECTION } kind_of_batch;
 
-/// Names as in bt_contact; lanes without a contact are zero.
+/// Names as in bt_contact and bt_mass; lanes without a contact are zero.
 typedef struct bt_batch {
     vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2];
     vec mu;                    // friction; of the projection: the overlap that is left alone, m
     vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
-    vec x[3], before[3], y[3]; // impulses, or multipliers: now, before the last sweep, after the move
-    vec bound[2];              // of the normals; bound[0] of sheets: the radius of their disc
+    vec x[3], before[3];       // impulses, or multipliers: now, before the last sweep
     bt_idx a[LANES], b[LANES], contact[LANES];
     bool moves_a[LANES], moves_b[LANES];
-    int n;
-    kind_of_batch kind;
+    uint8_t n, kind;
 } bt_batch;
+_Static_assert(sizeof(bt_batch) == 31 * sizeof(vec), "the listed contacts of dense ice, 248 bytes each");
+
+/// Of the normals; [0] of sheets: the radius of their disc. After the batches of a cell whose contacts have bounds.
+typedef struct bounds {
+    vec of[2];
+} bounds;
+
+static bounds *bounds_of(const bt_cell *cell) { return (bounds *)(cell->work.batch + cell->work.n_batches); }
 
 bool bt_batch_is_for(const bt_cell *cell)
 {
@@ -39,107 +45,194 @@ bool bt_batch_projects(const bt_cell *cell) { return cell->phase != BT_COLOURS; 
 
 size_t bt_batch_bytes(const bt_cell *cell)
 {
-    return bt_batch_is_for(cell) ? sizeof(bt_batch) / LANES + 2 * sizeof(bt_vel)
-                                 : sizeof(bt_contact) + 2 * (sizeof(bt_vel) + sizeof(bt_inv));
+    const size_t own = bt_batch_is_for(cell) ? (sizeof(bt_batch) + (cell->laws.limits ? sizeof(bounds) : 0)) / LANES
+                                             : sizeof(bt_contact) + sizeof(bt_in_place) + 2 * sizeof(bt_inv);
+    return own + 2 * sizeof(bt_vel);
 }
 
 // --- packing ---------------------------------------------------------------------------------------------------------
+
+void bt_batch_begin(bt_cell *cell) { cell->work.n_batches = 0; }
 
 static kind_of_batch kind_of(const bt_cell *cell, const bt_contact *u, bool projection)
 {
     return projection ? PROJECTION : !cell->laws.limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
 }
 
-static bool holds(const bt_batch *o, bt_idx body)
+/// The contacts of a batch, and those of their bodies that can be moved.
+typedef struct {
+    bt_idx contact[LANES], body[2 * LANES];
+    uint8_t n, n_bodies, kind;
+} place;
+
+/// Unknowns before the last sweep, and the multipliers of the projection, of one contact.
+typedef struct {
+    double before[3], multiplier[2];
+} unknowns;
+
+/// What a thread needs to pack a cell: on its stack for nearly all cells, which have some sixty contacts.
+enum { FEW = 128 };
+typedef struct {
+    place few_places[FEW], *place;      // [n_list]
+    unknowns few_unknowns[FEW], *of;    // [n_contacts]
+} packing;
+
+static bool holds(const place *o, bt_idx body)
 {
-    for (int l = 0; l < o->n; l++)
-        if ((o->moves_a[l] && o->a[l] == body) || (o->moves_b[l] && o->b[l] == body)) return true;
+    for (int l = 0; l < o->n_bodies; l++)
+        if (o->body[l] == body) return true;
     return false;
+}
+
+/// May a contact stand in a batch?
+static bool fits(const place *o, kind_of_batch kind, const bt_idx body[2], int n)
+{
+    return o->kind == kind && !(n > 0 && holds(o, body[0])) && !(n > 1 && holds(o, body[1]));
+}
+
+/// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
+/// bodies that can be moved. Those that filled up leave the window. Returns the number of batches.
+static bt_idx deal(const bt_cell *cell, const bt_inv *inv, bool projection, place *o)
+{
+    bt_idx open[OPEN], n_batches = 0;
+    int n_open = 0;
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_idx i = cell->work.list[j];
+        const bt_contact *u = &cell->contacts[i];
+        const kind_of_batch kind = kind_of(cell, u, projection);
+        bt_idx body[2];
+        int n = 0, k = 0;
+        if (inv[u->a].m > 0) body[n++] = u->a;
+        if (inv[u->b].m > 0) body[n++] = u->b;
+        while (k < n_open && !fits(&o[open[k]], kind, body, n)) k++;
+        if (k == n_open) {
+            if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
+            o[n_batches] = (place){.kind = (uint8_t)kind};
+            open[n_open++] = n_batches++;
+        }
+        place *p = &o[open[k]];
+        p->contact[p->n++] = i;
+        for (int l = 0; l < n; l++) p->body[p->n_bodies++] = body[l];
+        if (p->n < LANES) continue;
+        n_open--;
+        memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
+    }
+    return n_batches;
+}
+
+/// What the sweeps of a problem hand on to the next list: it is in the batches of the last one. A contact that was not
+/// in them has not been moved since; it has no multiplier.
+static void take_unknowns(const bt_cell *cell, bool projection, unknowns *of)
+{
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_idx i = cell->work.list[j];
+        const bt_contact *u = &cell->contacts[i];
+        of[i] = projection ? (unknowns){0} : (unknowns){.before = {u->ln[0], u->ln[1], u->lt}};
+    }
+    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
+        const bt_batch *o = &cell->work.batch[k];
+        for (int l = 0; l < o->n; l++) {
+            unknowns *to = &of[o->contact[l]];
+            for (int c = 0; c < 3; c++) to->before[c] = o->before[c][l];
+            to->multiplier[0] = o->x[0][l], to->multiplier[1] = o->x[1][l];
+        }
+    }
+}
+
+/// Room for exactly so many batches: lists of a cell differ little from step to step, and most memory of dense ice is
+/// here.
+static void make_room(bt_cell *cell, bt_idx n_batches)
+{
+    const size_t bytes = (size_t)n_batches * (sizeof(bt_batch) + (cell->laws.limits ? sizeof(bounds) : 0));
+    cell->work.n_batches = n_batches;
+    if (bytes <= cell->work.batch_bytes) return;
+    free(cell->work.batch);
+    cell->work.batch = bt_alloc_aligned(cell->work.batch_bytes = bytes, 1);
 }
 
 /// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
 /// have none.
-static void put_projection(bt_batch *o, int l, const bt_contact *u, const bt_gaps *g, double slop)
+static void put_projection(bt_batch *o, const bt_cell *cell, const unknowns *of, double slop)
 {
-    o->mu[l] = slop;
+    for (int l = 0; l < o->n; l++) {
+        const bt_idx i = o->contact[l];
+        o->mu[l] = slop;
+        for (int c = 0; c < 2; c++) {
+            o->bias[c][l] = c < cell->contacts[i].n ? cell->gaps[i].gap[c] : 0;
+            o->x[c][l] = of[i].multiplier[c];
+        }
+    }
+    o->x[2] = o->before[2] = (vec){0};
+}
+
+/// Masses of sheets one by one: they have a root.
+static void put_sheets(bt_batch *o, const bt_contact *const u[LANES], const bt_inv *inv)
+{
+    for (int l = 0; l < o->n; l++) {
+        const bt_mass m = bt_mass_of(u[l], inv);
+        o->w[0][l] = m.w[0], o->mn[0][l] = m.mn[0], o->wt[l] = m.wt, o->mt[l] = m.mt;
+    }
+}
+
+BT_INLINE void put(bt_batch *o, const bt_cell *cell, const place *p, const unknowns *of, const bt_inv *inv)
+{
+    static const bt_contact nothing;
+    static const unknowns nowhere;
+    const bt_contact *u[LANES];
+    const unknowns *x[LANES];
+    o->n = p->n, o->kind = p->kind;
+    for (int l = 0; l < LANES; l++) {
+        const bool there = l < p->n;
+        const bt_contact *at = &cell->contacts[p->contact[there ? l : 0]]; // empty lanes read its bodies, never write
+        u[l] = there ? at : &nothing;
+        x[l] = there ? &of[p->contact[l]] : &nowhere;
+        o->a[l] = at->a, o->b[l] = at->b, o->contact[l] = there ? p->contact[l] : 0;
+        o->moves_a[l] = there && inv[at->a].m > 0, o->moves_b[l] = there && inv[at->b].m > 0;
+    }
+    const bt_rows r = bt_rows_of(u);
+    bt_invs a = bt_take_inv(inv, o->a), b = bt_take_inv(inv, o->b);
+    const bt_mask there = (bt_mask){0, 1, 2, 3} < (bt_mask){p->n, p->n, p->n, p->n};
+    a.m = bt_only(there, a.m), a.i = bt_only(there, a.i), b.m = bt_only(there, b.m), b.i = bt_only(there, b.i);
+    const bt_masses m = bt_masses_of(&r, a, b);
+    o->nx = r.nx, o->ny = r.ny, o->rat = r.rat, o->rbt = r.rbt, o->mu = r.mu;
+    o->ma = a.m, o->ia = a.i, o->mb = b.m, o->ib = b.i;
+    o->w12 = m.w12, o->per_det = m.per_det, o->wt = m.wt, o->mt = m.mt;
     for (int c = 0; c < 2; c++) {
-        const bool there = c < u->n;
-        o->mn[c][l] = there ? u->mn[c] : 0;
-        o->bias[c][l] = there ? g->gap[c] : 0;
-        o->x[c][l] = there ? g->multiplier[c] : 0;
+        o->ran[c] = r.ran[c], o->rbn[c] = r.rbn[c], o->bias[c] = r.bias[c], o->w[c] = m.w[c], o->mn[c] = m.mn[c];
+        o->x[c] = r.ln[c];
     }
-    o->x[2][l] = o->before[2][l] = 0;
+    o->x[2] = r.lt;
+    for (int c = 0; c < 3; c++)
+        o->before[c] = (vec){x[0]->before[c], x[1]->before[c], x[2]->before[c], x[3]->before[c]};
+    if (p->kind == SHEETS) put_sheets(o, u, inv);
 }
 
-static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
+BT_FOR_EACH_CPU
+static void put_all(bt_cell *cell, const place *p, const unknowns *of, const bt_inv *inv, const double *slop)
 {
-    const bt_contact *u = &cell->contacts[i];
-    const int l = o->n++;
-    o->nx[l] = u->nx, o->ny[l] = u->ny;
-    for (int c = 0; c < 2; c++) {
-        o->ran[c][l] = u->ran[c], o->rbn[c][l] = u->rbn[c];
-        o->w[c][l] = u->w[c], o->mn[c][l] = u->mn[c], o->bias[c][l] = u->bias[c];
-        o->x[c][l] = u->ln[c];
+    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
+        bt_batch *o = &cell->work.batch[k];
+        put(o, cell, &p[k], of, inv);
+        if (slop) put_projection(o, cell, of, *slop);
+        if (!cell->laws.limits) continue;
+        bounds *at = &bounds_of(cell)[k];
+        *at = (bounds){0};
+        for (int l = 0; l < o->n; l++)
+            for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[o->contact[l]].flat[c];
     }
-    o->rat[l] = u->rat, o->rbt[l] = u->rbt;
-    o->w12[l] = u->w12, o->per_det[l] = u->per_det;
-    o->wt[l] = u->wt, o->mt[l] = u->mt, o->mu[l] = u->mu;
-    o->x[2][l] = u->lt;
-    for (int c = 0; c < 3; c++) o->before[c][l] = cell->work.before[i][c];
-    o->ma[l] = inv[u->a].m, o->ia[l] = inv[u->a].i, o->mb[l] = inv[u->b].m, o->ib[l] = inv[u->b].i;
-    for (int c = 0; cell->laws.limits && c < 2; c++) o->bound[c][l] = cell->laws.limits[i].flat[c];
-    o->a[l] = u->a, o->b[l] = u->b, o->contact[l] = i;
-    o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
 }
 
-static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_batch kind)
-{
-    if (cell->work.n_batches == cell->work.cap_batches) {
-        const bt_idx cap = cell->work.cap_batches + bt_max(2, cell->work.cap_batches / 4);
-        bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
-        if (cell->work.n_batches > 0) memcpy(more, cell->work.batch, (size_t)cell->work.n_batches * sizeof *more);
-        free(cell->work.batch);
-        cell->work.batch = more;
-        cell->work.cap_batches = cap;
-    }
-    bt_batch *o = &cell->work.batch[cell->work.n_batches++];
-    memset(o, 0, sizeof *o);
-    o->kind = kind;
-    for (int l = 0; l < LANES; l++) o->a[l] = u->a, o->b[l] = u->b; // of lanes that stay empty: read, never written
-    return o;
-}
-
-/// May a contact stand in a batch?
-static bool fits(const bt_batch *o, const bt_contact *u, kind_of_batch kind, const bt_inv *inv)
-{
-    return o->kind == kind && !(inv[u->a].m > 0 && holds(o, u->a)) && !(inv[u->b].m > 0 && holds(o, u->b));
-}
-
-/// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
-/// bodies. Those that filled up leave the window.
 static void pack(bt_cell *cell, const bt_inv *inv, const double *slop)
 {
-    bt_idx open[OPEN];
-    int n_open = 0;
-    cell->work.n_batches = 0;
+    packing s;
+    s.place = cell->work.n_list > FEW ? bt_realloc(NULL, (size_t)cell->work.n_list, sizeof *s.place) : s.few_places;
+    s.of = cell->n_contacts > FEW ? bt_realloc(NULL, (size_t)cell->n_contacts, sizeof *s.of) : s.few_unknowns;
+    take_unknowns(cell, slop != NULL, s.of);
+    make_room(cell, deal(cell, inv, slop != NULL, s.place));
+    put_all(cell, s.place, s.of, inv, slop);
     cell->work.packed = true;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_contact *u = &cell->contacts[cell->work.list[j]];
-        int k = 0;
-        const kind_of_batch kind = kind_of(cell, u, slop != NULL);
-        while (k < n_open && !fits(&cell->work.batch[open[k]], u, kind, inv)) k++;
-        if (k == n_open) {
-            if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
-            begin_batch(cell, u, kind);
-            open[n_open++] = cell->work.n_batches - 1;
-        }
-        bt_batch *o = &cell->work.batch[open[k]];
-        put(o, cell, cell->work.list[j], inv);
-        if (slop) put_projection(o, o->n - 1, u, &cell->gaps[cell->work.list[j]], *slop);
-        if (o->n < LANES) continue;
-        n_open--;
-        memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
-    }
+    if (s.place != s.few_places) free(s.place);
+    if (s.of != s.few_unknowns) free(s.of);
 }
 
 void bt_batch_unpack(bt_cell *cell)
@@ -148,52 +241,227 @@ void bt_batch_unpack(bt_cell *cell)
     cell->work.packed = false;
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
         const bt_batch *o = &cell->work.batch[k];
-        for (int l = 0; l < o->n; l++) {
+        for (int l = 0; o->kind != PROJECTION && l < o->n; l++) {
             bt_contact *u = &cell->contacts[o->contact[l]];
-            if (o->kind == PROJECTION) {
-                bt_gaps *g = &cell->gaps[o->contact[l]];
-                g->multiplier[0] = o->x[0][l], g->multiplier[1] = o->x[1][l];
-            } else {
-                u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
-            }
-            for (int c = 0; c < 3; c++) cell->work.before[o->contact[l]][c] = o->before[c][l];
+            u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
         }
     }
 }
 
+// --- residuals -------------------------------------------------------------------------------------------------------
+
+/// Which contacts the last sweep has moved, and their multipliers unless NULL; 0 of contacts that are in no batch.
+typedef struct {
+    uint8_t few_moved[FEW], *moved;          // [n_contacts]
+    double few_x[FEW][2], (*x)[2];           // [n_contacts]
+} last_sweep;
+
+static void take_last(const bt_cell *cell, bool projection, last_sweep *s)
+{
+    const size_t n = (size_t)cell->n_contacts;
+    const bool few = n <= FEW;
+    s->moved = few ? s->few_moved : bt_realloc(NULL, n, sizeof *s->moved);
+    s->x = !projection ? NULL : few ? s->few_x : bt_realloc(NULL, n, sizeof *s->x);
+    if (n > 0) memset(s->moved, 0, n * sizeof *s->moved);
+    if (n > 0 && projection) memset(s->x, 0, n * sizeof *s->x);
+    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
+        const bt_batch *o = &cell->work.batch[k];
+        for (int l = 0; l < o->n; l++) {
+            const bt_idx i = o->contact[l];
+            const bt_contact *u = &cell->contacts[i];
+            const double x[3] = {projection ? o->x[0][l] : u->ln[0], projection ? o->x[1][l] : u->ln[1],
+                                 projection ? 0 : u->lt};
+            s->moved[i] = x[0] != o->before[0][l] || x[1] != o->before[1][l] || x[2] != o->before[2][l];
+            if (projection) s->x[i][0] = x[0], s->x[i][1] = x[1];
+        }
+    }
+}
+
+static void free_last(last_sweep *s)
+{
+    if (s->moved != s->few_moved) free(s->moved);
+    if (s->x && s->x != s->few_x) free(s->x);
+}
+
+/// Lanes of a vector for loops over contacts.
+typedef struct {
+    double of[LANES];
+} lanes;
+
+static inline lanes lanes_of(vec a)
+{
+    lanes o;
+    memcpy(&o, &a, sizeof o);
+    return o;
+}
+
+/// The records of contacts i to i + 3 and their bodies; the last one again where there are no more.
+BT_INLINE void four_from(const bt_cell *cell, bt_idx i, const bt_contact *u[LANES], bt_idx a[LANES], bt_idx b[LANES])
+{
+    for (int l = 0; l < LANES; l++) {
+        u[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
+        a[l] = u[l]->a, b[l] = u[l]->b;
+    }
+}
+
+BT_INLINE vec limits_of(const bt_limit *const k[LANES], int c)
+{
+    // of `most` and `flat` the lower one: nothing rises here
+    vec most = {k[0]->most[c], k[1]->most[c], k[2]->most[c], k[3]->most[c]};
+    return bt_smaller(most, (vec){k[0]->flat[c], k[1]->flat[c], k[2]->flat[c], k[3]->flat[c]});
+}
+
+/// As bt_contact_residual and the list of residual_in_place (solver.c).
+BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                            const uint8_t *moved, bool bounded)
+{
+    const double near = BT_NEAR * p->tolerance;
+    const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
+    const bt_limit *limits = cell->laws.limits;
+    bt_found f = {0};
+    for (bt_idx i = 0; i < cell->n_contacts; i += LANES) {
+        const bt_contact *u[LANES];
+        bt_idx at_a[LANES], at_b[LANES];
+        four_from(cell, i, u, at_a, at_b);
+        const bt_rows r = bt_rows_of(u);
+        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
+        const bt_motions a = bt_take_four(v, at_a), b = bt_take_four(v, at_b);
+        const bt_limit *k[LANES];
+        for (int l = 0; bounded && l < LANES; l++) k[l] = &limits[u[l] - cell->contacts];
+        const vec dx = b.x - a.x, dy = b.y - a.y, un = r.nx * dx + r.ny * dy;
+        vec worst = zero, square[3], total = zero;
+        mask on = (r.ln[0] + r.ln[1] > zero) | (r.lt != zero);
+        for (int c = 0; c < 2; c++) {
+            const mask there = c ? r.two : r.one;
+            const vec w = un + r.rbn[c] * b.w - r.ran[c] * a.w + r.bias[c];
+            vec map;
+            if (bounded) {
+                const vec to = w - m.w[c] * r.ln[c];
+                map = bt_larger(zero, bt_smaller(-to * m.mn[c], limits_of(k, c)));
+            } else {
+                map = bt_larger(zero, r.ln[c] - w * m.mn[c]);
+            }
+            const vec e = bt_only(there, (map - r.ln[c]) * m.w[c]);
+            worst = bt_larger(worst, bt_size_of(e));
+            square[c] = e * e;
+            total += bt_only(there, r.ln[c]);
+            on |= there & ~(w >= zero);
+        }
+        const vec wt = r.nx * dy - r.ny * dx + r.rbt * b.w - r.rat * a.w, bound = r.mu * total;
+        const vec e = (bt_larger(-bound, bt_smaller(bound, r.lt - wt * m.mt)) - r.lt) * m.wt;
+        square[2] = e * e;
+        worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
+        const lanes most = lanes_of(worst), normal = lanes_of(square[0]), second = lanes_of(square[1]),
+                    tangent = lanes_of(square[2]);
+        for (int l = 0; l < LANES && i + l < cell->n_contacts; l++) {
+            double largest = most.of[l];
+            bool listed = p->plain || on[l] || moved[i + l];
+            if (bounded && u[l]->n == 0) {
+                const bt_mass own = bt_mass_of(u[l], inv);
+                largest = bt_sheets_residual(u[l], &own, k[l], v, &f.squares);
+                listed = p->plain || u[l]->ln[0] + u[l]->ln[1] > 0 || u[l]->lt != 0 || moved[i + l] || largest > 0;
+                f.rows++;
+            } else {
+                f.squares += normal.of[l];
+                f.squares += second.of[l];
+                f.squares += tangent.of[l];
+            }
+            f.most = bt_max(f.most, largest);
+            f.bad += largest > near;
+            f.rows += u[l]->n + 1;
+            cell->work.list[cell->work.n_list] = i + l;
+            cell->work.n_list += listed;
+        }
+    }
+    return f;
+}
+
+BT_FOR_EACH_CPU
+static bt_found residual_of_rigid(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                                  const uint8_t *moved)
+{
+    return residual(cell, v, inv, p, moved, false);
+}
+
+BT_FOR_EACH_CPU
+static bt_found residual_of_bounded(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                                    const uint8_t *moved)
+{
+    return residual(cell, v, inv, p, moved, true);
+}
+
+bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p)
+{
+    last_sweep s;
+    take_last(cell, false, &s);
+    const bt_found f = cell->laws.limits ? residual_of_bounded(cell, v, inv, p, s.moved)
+                                         : residual_of_rigid(cell, v, inv, p, s.moved);
+    free_last(&s);
+    return f;
+}
+
+/// As residual_in_place of project.c.
+BT_FOR_EACH_CPU
+static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
+                                       const bt_problem *p, const last_sweep *s)
+{
+    const double near = BT_NEAR * p->tolerance;
+    const vec zero = {0};
+    bt_found f = {0};
+    for (bt_idx i = 0; i < cell->n_contacts; i += LANES) {
+        const bt_contact *u[LANES];
+        bt_idx at_a[LANES], at_b[LANES];
+        four_from(cell, i, u, at_a, at_b);
+        const bt_rows r = bt_rows_of(u);
+        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
+        const bt_motions a = bt_take_four(d, at_a), b = bt_take_four(d, at_b);
+        const vec un = r.nx * (b.x - a.x) + r.ny * (b.y - a.y);
+        vec worst = zero, square[2];
+        mask on = {0};
+        for (int c = 0; c < 2; c++) {
+            const mask there = c ? r.two : r.one;
+            vec gap, x;
+            for (int l = 0; l < LANES; l++) {
+                const bt_idx j = (bt_idx)(u[l] - cell->contacts);
+                gap[l] = cell->gaps[j].gap[c], x[l] = s->x[j][c];
+            }
+            const vec open = un + r.rbn[c] * b.w - r.ran[c] * a.w + gap + slop;
+            const vec e = bt_only(there, bt_size_of(bt_larger(zero, x - open * m.mn[c]) - x) * m.w[c]);
+            worst = bt_larger(worst, e);
+            square[c] = e * e;
+            on |= there & ((x > zero) | ~(open >= zero));
+        }
+        const lanes most = lanes_of(worst), first = lanes_of(square[0]), second = lanes_of(square[1]);
+        for (int l = 0; l < LANES && i + l < cell->n_contacts; l++) {
+            f.squares += first.of[l];
+            f.squares += second.of[l];
+            f.most = bt_max(f.most, most.of[l]);
+            f.bad += most.of[l] > near;
+            f.rows += u[l]->n;
+            cell->work.list[cell->work.n_list] = i + l;
+            cell->work.n_list += on[l] || s->moved[i + l];
+        }
+    }
+    return f;
+}
+
+bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
+                                      const bt_problem *p)
+{
+    last_sweep s;
+    take_last(cell, true, &s);
+    const bt_found f = residual_of_projection(cell, slop, d, inv, p, &s);
+    free_last(&s);
+    return f;
+}
+
 // --- arithmetic ------------------------------------------------------------------------------------------------------
 
-/// Velocities of four bodies, component by component.
-typedef struct {
-    vec x, y, w, unused;
-} motion;
-
-/// Rows to columns; its own inverse.
-BT_INLINE void transpose(motion *m)
-{
-    const vec a = __builtin_shufflevector(m->x, m->y, 0, 4, 2, 6), b = __builtin_shufflevector(m->x, m->y, 1, 5, 3, 7);
-    const vec c = __builtin_shufflevector(m->w, m->unused, 0, 4, 2, 6),
-              d = __builtin_shufflevector(m->w, m->unused, 1, 5, 3, 7);
-    m->x = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-    m->y = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-    m->w = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-    m->unused = __builtin_shufflevector(b, d, 2, 3, 6, 7);
-}
-
-BT_INLINE motion load(const bt_vel *v, const bt_idx *body)
-{
-    motion m;
-    memcpy(&m.x, &v[body[0]], sizeof m.x);
-    memcpy(&m.y, &v[body[1]], sizeof m.y);
-    memcpy(&m.w, &v[body[2]], sizeof m.w);
-    memcpy(&m.unused, &v[body[3]], sizeof m.unused);
-    transpose(&m);
-    return m;
-}
+typedef bt_motions motion;
 
 BT_INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
 {
-    transpose(&m);
+    bt_transpose(&m);
     if (moves[0]) memcpy(&v[body[0]], &m.x, sizeof m.x);
     if (moves[1]) memcpy(&v[body[1]], &m.y, sizeof m.y);
     if (moves[2]) memcpy(&v[body[2]], &m.w, sizeof m.w);
@@ -218,7 +486,7 @@ BT_INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b
 BT_INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 
 /// As bt_limit_rim.
-BT_INLINE void rim(const bt_batch *o, const vec b[2], vec l[2])
+BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[2])
 {
     const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY}, half = {0.5, 0.5, 0.5, 0.5};
     vec least = endless;
@@ -226,8 +494,8 @@ BT_INLINE void rim(const bt_batch *o, const vec b[2], vec l[2])
     for (int side = 0; side < 4; side++) {
         const int i = side >> 1, k = 1 - i;
         vec x[2];
-        x[i] = side & 1 ? o->bound[i] : zero;
-        x[k] = bt_larger(zero, bt_smaller(o->bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
+        x[i] = side & 1 ? bound[i] : zero;
+        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
         const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
         const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) +
                           x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
@@ -241,31 +509,31 @@ BT_INLINE void rim(const bt_batch *o, const vec b[2], vec l[2])
 }
 
 /// As bt_limit_normals where no bound rises.
-BT_INLINE void bound_normals(const bt_batch *o, const motion *p, const motion *q, vec *l1, vec *l2)
+BT_INLINE void bound_normals(const bt_batch *o, const vec bound[2], const motion *p, const motion *q, vec *l1, vec *l2)
 {
-    const mask over = (*l1 > o->bound[0]) | (*l2 > o->bound[1]);
+    const mask over = (*l1 > bound[0]) | (*l2 > bound[1]);
     if (!any_of(over)) return;
     const vec zero = {0}, un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
     vec b[2], l[2] = {*l1, *l2};
     for (int i = 0; i < 2; i++)
         b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
-    const vec alone = bt_larger(zero, bt_smaller(-b[0] * o->mn[0], o->bound[0]));
-    rim(o, b, l);
+    const vec alone = bt_larger(zero, bt_smaller(-b[0] * o->mn[0], bound[0]));
+    rim(o, bound, b, l);
     const mask one = o->mn[1] == zero;
     *l1 = bt_choose(over, bt_choose(one, alone, l[0]), *l1);
     *l2 = bt_choose(over & ~one, l[1], *l2);
 }
 
 /// As bt_update_sheets; lanes without a contact have a disc of 0 and no step.
-BT_INLINE vec update_sheets(bt_batch *o, bt_vel *v)
+BT_INLINE vec update_sheets(bt_batch *o, vec disc, bt_vel *v)
 {
-    motion a = load(v, o->a), b = load(v, o->b);
+    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
     const vec dvx = b.x - a.x, dvy = b.y - a.y;
     vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
     vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
     const vec square = x * x + y * y, one = {1, 1, 1, 1};
     for (int l = 0; l < LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
-    const vec scale = bt_choose(far > o->bound[0], o->bound[0] / far, one);
+    const vec scale = bt_choose(far > disc, disc / far, one);
     x *= scale;
     y *= scale;
     const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
@@ -281,13 +549,13 @@ BT_INLINE vec update_sheets(bt_batch *o, bt_vel *v)
     return bt_larger(bt_size_of(dx), bt_size_of(dy)) * o->wt;
 }
 
-/// As bt_update_contact; the largest corrections, m/s.
-BT_INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
+/// As bt_update_contact, with bounds of the normals or NULL; the largest corrections, m/s.
+BT_INLINE vec update(bt_batch *o, const vec *limits, bt_vel *v)
 {
-    motion a = load(v, o->a), b = load(v, o->b);
+    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
     vec l1, l2;
     solve_normals(o, &a, &b, &l1, &l2);
-    if (bounded) bound_normals(o, &a, &b, &l1, &l2);
+    if (limits) bound_normals(o, limits, &a, &b, &l1, &l2);
     const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
     a.x -= o->ma * jx;
     a.y -= o->ma * jy;
@@ -313,7 +581,7 @@ BT_INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
 /// As the update of one contact in project.c: its points one after the other.
 BT_INLINE vec project(bt_batch *o, bt_vel *d)
 {
-    motion a = load(d, o->a), b = load(d, o->b);
+    motion a = bt_take_four(d, o->a), b = bt_take_four(d, o->b);
     const vec zero = {0};
     vec most = zero;
     for (int i = 0; i < 2; i++) {
@@ -340,7 +608,7 @@ BT_FOR_EACH_CPU
 static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
 {
     vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, update(&batch[k], v, false));
+    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, update(&batch[k], NULL, v));
     return largest_lane(most);
 }
 
@@ -359,13 +627,19 @@ static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
     vec most = {0};
     for (bt_idx k = 0; k < n; k++) {
         bt_batch *o = &batch[k];
-        most = bt_larger(most, o->kind == SHEETS ? update_sheets(o, v) : update(o, v, true));
+        const vec *limits = ((const bounds *)(batch + n))[k].of;
+        most = bt_larger(most, o->kind == SHEETS ? update_sheets(o, limits[0], v) : update(o, limits, v));
     }
     return largest_lane(most);
 }
 
+/// Unknowns of a batch after their move: of one visit to a cell.
+typedef struct {
+    vec x[3];
+} moved;
+
 BT_FOR_EACH_CPU
-static void move(bt_batch *batch, bt_idx n, double beta)
+static void move(bt_batch *batch, bt_idx n, double beta, moved *y)
 {
     for (bt_idx k = 0; k < n; k++) {
         bt_batch *o = &batch[k];
@@ -373,18 +647,18 @@ static void move(bt_batch *batch, bt_idx n, double beta)
             const vec now = o->x[c];
             if (beta > 0) o->x[c] = now + beta * (now - o->before[c]);
             o->before[c] = now;
-            o->y[c] = o->x[c];
+            y[k].x[c] = o->x[c];
         }
     }
 }
 
 BT_FOR_EACH_CPU
-static double against(const bt_batch *batch, bt_idx n)
+static double against(const bt_batch *batch, bt_idx n, const moved *y)
 {
     vec sum = {0};
     for (bt_idx k = 0; k < n; k++) {
         const bt_batch *o = &batch[k];
-        for (int c = 0; c < 3; c++) sum += (c < 2 ? o->w[c] : o->wt) * (o->y[c] - o->x[c]) * (o->x[c] - o->before[c]);
+        for (int c = 0; c < 3; c++) sum += (c < 2 ? o->w[c] : o->wt) * (y[k].x[c] - o->x[c]) * (o->x[c] - o->before[c]);
     }
     return sum[0] + sum[1] + sum[2] + sum[3];
 }
@@ -394,14 +668,20 @@ typedef double pass_of_batches(bt_batch *batch, bt_idx n, bt_vel *v);
 static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sweep *s, int times, double enough,
                     int64_t *done, double *most)
 {
-    if (s->moves) move(cell->work.batch, cell->work.n_batches, s->beta);
+    bt_batch *batch = cell->work.batch;
+    const bt_idx n_batches = cell->work.n_batches;
+    moved few[FEW / LANES], *y = few;
+    if (s->moves && n_batches > FEW / LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
+    if (s->moves) move(batch, n_batches, s->beta, y);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
-        last = once(cell->work.batch, cell->work.n_batches, v);
+        last = once(batch, n_batches, v);
         if (n == 0) *most = last;
         *done += cell->work.n_list;
     }
-    return s->moves ? against(cell->work.batch, cell->work.n_batches) : 0;
+    const double turned = s->moves ? against(batch, n_batches, y) : 0;
+    if (y != few) free(y);
+    return turned;
 }
 
 double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,

@@ -17,7 +17,8 @@
 // of its own kind, whose unknowns are the multipliers of the points (project.c).
 //
 // Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
-// contacts.
+// contacts. What an unknown was before the last sweep, and the multipliers of the projection, stay in the batches until
+// the next list is packed: a contact that is in none was not moved, for otherwise it would have been listed.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
@@ -32,17 +33,26 @@ bool bt_batch_projects(const bt_cell *cell);
 /// bodies, or its record and all that is hot of them.
 size_t bt_batch_bytes(const bt_cell *cell);
 
+/// The cell has a new problem, and no batches yet.
+void bt_batch_begin(bt_cell *cell);
+
+/// What a residual pass finds in the cell, whose impulses are in its contacts; it lists them. Or in the position
+/// projection, d: displacements, slop: overlap that is left alone, m.
+bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p);
+bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
+                                      const bt_problem *p);
+
 /// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
 /// first pass in *most. Returns how far it turned against its move, J.
 double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
                       int64_t *done, double *most);
 
-/// The same for the position projection, in one pass; d: displacements, slop: overlap that is left alone, m.
+/// The same for the position projection, in one pass.
 double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
                         double *most);
 
-/// Impulses back into the contacts, or multipliers into the gaps; nothing when they are there.
+/// Impulses back into the contacts; nothing when they are there. Multipliers stay in the batches.
 void bt_batch_unpack(bt_cell *cell);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The innermost arithmetic of a sweep: one contact, two bodies (private to the solver).
+// The innermost arithmetic of a sweep: one contact with its masses, two bodies (private to the solver).
 #ifndef BERGTOW_KERNEL_H
 #define BERGTOW_KERNEL_H
 
@@ -13,18 +13,19 @@
 /// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points
 /// that coincide) the first of the single cases that holds is taken; so it is for one point, whose second has no mass
 /// (mn 0).
-static inline void bt_solve_normals(const bt_contact *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
+static inline void bt_solve_normals(const bt_contact *u, const bt_mass *m, const bt_vel *va, const bt_vel *vb,
+                                    double *l1, double *l2)
 {
     const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
     const double u1 = un + u->rbn[0] * vb->w - u->ran[0] * va->w + u->bias[0];
     const double u2 = un + u->rbn[1] * vb->w - u->ran[1] * va->w + u->bias[1];
     // Velocities with both impulses taken off.
-    const double b1 = u1 - u->w[0] * u->ln[0] - u->w12 * u->ln[1], b2 = u2 - u->w12 * u->ln[0] - u->w[1] * u->ln[1];
-    *l1 = (u->w12 * b2 - u->w[1] * b1) * u->per_det;
-    *l2 = (u->w12 * b1 - u->w[0] * b2) * u->per_det;
-    if (!(u->per_det > 0 && *l1 >= 0 && *l2 >= 0)) {
-        const double only1 = bt_max(0, -b1 * u->mn[0]), only2 = bt_max(0, -b2 * u->mn[1]);
-        const bool first = b2 + u->w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
+    const double b1 = u1 - m->w[0] * u->ln[0] - m->w12 * u->ln[1], b2 = u2 - m->w12 * u->ln[0] - m->w[1] * u->ln[1];
+    *l1 = (m->w12 * b2 - m->w[1] * b1) * m->per_det;
+    *l2 = (m->w12 * b1 - m->w[0] * b2) * m->per_det;
+    if (!(m->per_det > 0 && *l1 >= 0 && *l2 >= 0)) {
+        const double only1 = bt_max(0, -b1 * m->mn[0]), only2 = bt_max(0, -b2 * m->mn[1]);
+        const bool first = b2 + m->w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
         *l1 = first ? only1 : 0;
         *l2 = first ? 0 : only2;
     }
@@ -34,18 +35,18 @@ static inline void bt_solve_normals(const bt_contact *u, const bt_vel *va, const
 /// the points are the same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two
 /// separate unknowns would drift apart along their null space and eat up the friction cone. Returns the largest
 /// correction, m/s.
-static inline double bt_take_normals(bt_contact *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v,
-                                     const bt_inv *inv)
+static inline double bt_take_normals(bt_contact *u, const bt_mass *m, double l1, double l2, bt_vel va, bt_vel vb,
+                                     bt_vel *v, const bt_inv *inv)
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
     const double d1 = l1 - u->ln[0], d2 = l2 - u->ln[1];
     bt_apply(u, d1 + d2, d1 * u->ran[0] + d2 * u->ran[1], d1 * u->rbn[0] + d2 * u->rbn[1], 0, ia, ib, &va, &vb);
-    const double t = bt_clamp(u->lt - bt_tangent_velocity(u, &va, &vb) * u->mt, u->mu * (l1 + l2)), dt = t - u->lt;
+    const double t = bt_clamp(u->lt - bt_tangent_velocity(u, &va, &vb) * m->mt, u->mu * (l1 + l2)), dt = t - u->lt;
     bt_apply(u, 0, 0, 0, dt, ia, ib, &va, &vb);
     u->ln[0] = l1, u->ln[1] = l2, u->lt = t;
     bt_store(&v[u->a], ia, &va);
     bt_store(&v[u->b], ib, &vb);
-    return bt_max(bt_max(fabs(d1) * u->w[0], fabs(d2) * u->w[1]), fabs(dt) * u->wt);
+    return bt_max(bt_max(fabs(d1) * m->w[0], fabs(d2) * m->w[1]), fabs(dt) * m->wt);
 }
 
 /// The nearest point of a disc about 0.
@@ -57,69 +58,73 @@ static inline void bt_onto_disc(double radius, double *x, double *y)
 }
 
 /// What the friction of sheets would be after a step of its own (contact/raft.h).
-static inline void bt_sheets_map(const bt_contact *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x,
-                                 double *y)
+static inline void bt_sheets_map(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *va,
+                                 const bt_vel *vb, double *x, double *y)
 {
-    *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * u->mn[0];
-    *y = u->lt - bt_tangent_velocity(u, va, vb) * u->mt;
+    *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * m->mn[0];
+    *y = u->lt - bt_tangent_velocity(u, va, vb) * m->mt;
     bt_onto_disc(k->flat[0], x, y);
 }
 
-static inline double bt_update_sheets(bt_contact *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+static inline double bt_update_sheets(bt_contact *u, const bt_mass *m, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
     bt_vel va = v[u->a], vb = v[u->b];
     double x, y;
-    bt_sheets_map(u, k, &va, &vb, &x, &y);
+    bt_sheets_map(u, m, k, &va, &vb, &x, &y);
     const double dx = x - u->ln[0], dy = y - u->lt;
     bt_apply(u, dx, dx * u->ran[0], dx * u->rbn[0], dy, ia, ib, &va, &vb);
     u->ln[0] = x, u->lt = y;
     bt_store(&v[u->a], ia, &va);
     bt_store(&v[u->b], ib, &vb);
-    return bt_max(fabs(dx), fabs(dy)) * u->wt;
+    return bt_max(fabs(dx), fabs(dy)) * m->wt;
 }
 
 /// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
-static inline double bt_update_contact(bt_contact *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+static inline double bt_update_contact(bt_contact *u, const bt_mass *m, const bt_limit *k, bt_vel *v,
+                                       const bt_inv *inv)
 {
-    if (k && u->n == 0) return bt_update_sheets(u, k, v, inv);
+    if (k && u->n == 0) return bt_update_sheets(u, m, k, v, inv);
     const bt_vel va = v[u->a], vb = v[u->b];
     double l[2];
-    bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
-    if (k) bt_limit_normals(k, u, &va, &vb, l);
-    return bt_take_normals(u, l[0], l[1], va, vb, v, inv);
+    bt_solve_normals(u, m, &va, &vb, &l[0], &l[1]);
+    if (k) bt_limit_normals(k, u, m, &va, &vb, l);
+    return bt_take_normals(u, m, l[0], l[1], va, vb, v, inv);
 }
 
 /// What the normal impulse of point i would be with all others held.
-static inline double bt_normal_map(const bt_contact *u, const bt_limit *k, int i, const bt_vel *va, const bt_vel *vb)
+static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const bt_limit *k, int i, const bt_vel *va,
+                                   const bt_vel *vb)
 {
     const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
-    return k ? bt_limit_point(k, u, i, w - u->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * u->mn[i]);
+    return k ? bt_limit_point(k, u, m, i, w - m->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * m->mn[i]);
 }
 
-static inline double bt_sheets_residual(const bt_contact *u, const bt_limit *k, const bt_vel *v, double *sum)
+static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
+                                        double *sum)
 {
     double x, y;
-    bt_sheets_map(u, k, &v[u->a], &v[u->b], &x, &y);
-    x = (x - u->ln[0]) * u->wt, y = (y - u->lt) * u->wt;
+    bt_sheets_map(u, m, k, &v[u->a], &v[u->b], &x, &y);
+    x = (x - u->ln[0]) * m->wt, y = (y - u->lt) * m->wt;
     *sum += x * x + y * y;
     return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
 }
 
 /// Natural-map residual of a contact, m/s; into *sum the squares over its rows (a normal one a point, one tangential;
 /// two of sheets).
-static inline double bt_contact_residual(const bt_contact *u, const bt_limit *k, const bt_vel *v, double *sum)
+static inline double bt_contact_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
+                                         double *sum)
 {
-    if (k && u->n == 0) return bt_sheets_residual(u, k, v, sum);
+    if (k && u->n == 0) return bt_sheets_residual(u, m, k, v, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double worst = 0, total = 0;
     for (int i = 0; i < u->n; i++) {
-        const double r = (bt_normal_map(u, k, i, va, vb) - u->ln[i]) * u->w[i];
+        const double r = (bt_normal_map(u, m, k, i, va, vb) - u->ln[i]) * m->w[i];
         worst = bt_max(worst, fabs(r));
         *sum += r * r;
         total += u->ln[i];
     }
-    const double wt = bt_tangent_velocity(u, va, vb), r = (bt_clamp(u->lt - wt * u->mt, u->mu * total) - u->lt) * u->wt;
+    const double wt = bt_tangent_velocity(u, va, vb), r = (bt_clamp(u->lt - wt * m->mt, u->mu * total) - u->lt) * m->wt;
     *sum += r * r;
     return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // the maximum itself passes over a NaN
 }
@@ -131,18 +136,19 @@ static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double sl
     return bt_normal_velocity(u, i, da, db) + g->gap[i] + slop;
 }
 
-/// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the
+/// Gauss–Seidel update of the multipliers of a contact in the position projection, kg m, d: displacements. Returns the
 /// largest correction, m.
-static inline double bt_project_contact(const bt_contact *u, bt_gaps *g, double slop, bt_vel *d, const bt_inv *inv)
+static inline double bt_project_contact(const bt_contact *u, const bt_mass *m, const bt_gaps *g, double multiplier[2],
+                                        double slop, bt_vel *d, const bt_inv *inv)
 {
     bt_vel da = d[u->a], db = d[u->b];
     double most = 0;
     for (int i = 0; i < u->n; i++) {
-        const double p = bt_max(0, g->multiplier[i] - bt_opening(u, g, slop, i, &da, &db) * u->mn[i]);
-        const double step = p - g->multiplier[i];
-        g->multiplier[i] = p;
+        const double p = bt_max(0, multiplier[i] - bt_opening(u, g, slop, i, &da, &db) * m->mn[i]);
+        const double step = p - multiplier[i];
+        multiplier[i] = p;
         bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
-        most = bt_max(most, fabs(step) * u->w[i]);
+        most = bt_max(most, fabs(step) * m->w[i]);
     }
     bt_store(&d[u->a], inv[u->a], &da);
     bt_store(&d[u->b], inv[u->b], &db);

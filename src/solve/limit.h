@@ -12,10 +12,10 @@
 /// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
 /// slope W), where it is above the flat part exactly when that is so at the solution. `place` and not the bias: a
 /// rebound is no crushing.
-static inline double bt_limit_point(const bt_limit *l, const bt_contact *u, int i, double b)
+static inline double bt_limit_point(const bt_limit *l, const bt_contact *u, const bt_mass *m, int i, double b)
 {
-    const double rising = (l->base[i] - l->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + l->slope[i] * u->w[i]);
-    return bt_max(0, bt_min(-b * u->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
+    const double rising = (l->base[i] - l->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + l->slope[i] * m->w[i]);
+    return bt_max(0, bt_min(-b * m->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
 }
 
 /// Bound of point i at these velocities, N s.
@@ -27,7 +27,7 @@ static inline double bt_limit_bound(const bt_limit *l, const bt_contact *u, int 
 
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
 /// multiplier has the right sign, and of sides that rounding leaves in doubt the one of least value.
-static inline void bt_limit_rim(const bt_contact *u, const double b[2], const double c[2], double l[2])
+static inline void bt_limit_rim(const bt_mass *m, const double b[2], const double c[2], double l[2])
 {
     double least = INFINITY;
     for (int side = 0; side < 4; side++) {
@@ -35,10 +35,10 @@ static inline void bt_limit_rim(const bt_contact *u, const double b[2], const do
         double x[2];
         x[i] = side & 1 ? c[i] : 0;
         if (isinf(x[i])) continue;
-        x[o] = bt_max(0, bt_min(c[o], -(b[o] + u->w12 * x[i]) * u->mn[o]));
-        const double slope = b[i] + u->w[i] * x[i] + u->w12 * x[o];
-        const double value = x[0] * (0.5 * (u->w[0] * x[0] + u->w12 * x[1]) + b[0]) +
-                             x[1] * (0.5 * (u->w12 * x[0] + u->w[1] * x[1]) + b[1]);
+        x[o] = bt_max(0, bt_min(c[o], -(b[o] + m->w12 * x[i]) * m->mn[o]));
+        const double slope = b[i] + m->w[i] * x[i] + m->w12 * x[o];
+        const double value = x[0] * (0.5 * (m->w[0] * x[0] + m->w12 * x[1]) + b[0]) +
+                             x[1] * (0.5 * (m->w12 * x[0] + m->w[1] * x[1]) + b[1]);
         const bool right = side & 1 ? slope <= 0 : slope >= 0;
         if (right || value < least) l[0] = x[0], l[1] = x[1], least = value;
         if (right) return;
@@ -47,32 +47,33 @@ static inline void bt_limit_rim(const bt_contact *u, const double b[2], const do
 
 /// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point
 /// by point, a few times: the sweeps do the rest.
-static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const double b[2], double l[2])
+static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const bt_mass *m, const double b[2],
+                                double l[2])
 {
     enum { TURNS = 4 };
-    l[0] = (u->w12 * b[1] - u->w[1] * b[0]) * u->per_det;
-    l[1] = (u->w12 * b[0] - u->w[0] * b[1]) * u->per_det;
-    if (u->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
+    l[0] = (m->w12 * b[1] - m->w[1] * b[0]) * m->per_det;
+    l[1] = (m->w12 * b[0] - m->w[0] * b[1]) * m->per_det;
+    if (m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
     if (k->slope[0] == 0 && k->slope[1] == 0) {
-        bt_limit_rim(u, b, k->flat, l);
+        bt_limit_rim(m, b, k->flat, l);
         return;
     }
     l[0] = u->ln[0], l[1] = u->ln[1];
     for (int turn = 0; turn < TURNS; turn++)
-        for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, i, b[i] + u->w12 * l[1 - i]);
+        for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, m, i, b[i] + m->w12 * l[1 - i]);
 }
 
 /// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is
 /// below the flat parts.
-static inline void bt_limit_normals(const bt_limit *k, const bt_contact *u, const bt_vel *va, const bt_vel *vb,
-                                    double l[2])
+static inline void bt_limit_normals(const bt_limit *k, const bt_contact *u, const bt_mass *m, const bt_vel *va,
+                                    const bt_vel *vb, double l[2])
 {
     if (!(l[0] > k->flat[0] || l[1] > k->flat[1])) return;
     double b[2] = {0};
     for (int i = 0; i < u->n; i++)
-        b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
-    if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
-    else bt_limit_two(k, u, b, l);
+        b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - m->w[i] * u->ln[i] - m->w12 * u->ln[1 - i];
+    if (u->n == 1) l[0] = bt_limit_point(k, u, m, 0, b[0]);
+    else bt_limit_two(k, u, m, b, l);
 }
 
 #endif

@@ -19,17 +19,26 @@
 #include "space/phases.h"
 #include "solve/rounds.h"
 
+/// Fields are shaken plain, and keep their bits.
+static bool in_batches(const bt_cell *cell, bool plain) { return bt_batch_projects(cell) && !plain; }
+
+/// No multipliers yet.
+static void begin(const bt_world *w, bt_cell *cell)
+{
+    bt_rounds_list(cell);
+    bt_batch_begin(cell);
+    if (!in_batches(cell, w->par.plain_sweeps)) bt_rounds_in_place(cell, w->bodies.inv);
+}
+
 static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)context;
     bt_cell *cell = &w->cells->cell[k];
-    bt_rounds_list(cell);
+    begin(w, cell);
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         bt_gaps *g = &cell->gaps[j];
-        for (int i = 0; i < 3; i++) cell->work.before[j][i] = 0;
         for (int i = 0; i < u->n; i++) {
-            g->multiplier[i] = 0;
             g->gap[i] += w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
             if (cell->laws.limits) g->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->gap[i]);
@@ -37,34 +46,42 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
     }
 }
 
+static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, const bt_problem *p)
+{
+    bt_found f = {0};
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
+        const bt_gaps *g = &cell->gaps[j];
+        const bt_in_place *o = &cell->work.in_place[j];
+        double worst = 0;
+        bool on = p->plain;
+        for (int i = 0; i < u->n; i++) {
+            const double open = bt_opening(u, g, slop, i, &d[u->a], &d[u->b]), x = o->multiplier[i];
+            const double r = fabs(bt_max(0, x - open * o->mass.mn[i]) - x) * o->mass.w[i];
+            worst = bt_max(worst, r);
+            f.squares += r * r;
+            on = on || x > 0 || x != o->before[i] || !(open >= 0);
+        }
+        f.most = bt_max(f.most, worst);
+        f.bad += worst > BT_NEAR * p->tolerance;
+        f.rows += u->n;
+        if (on) cell->work.list[cell->work.n_list++] = j;
+    }
+    return f;
+}
+
 static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_problem *p = context;
     bt_cell *cell = &w->cells->cell[k];
     const bt_vel *d = w->solver->shift;
-    const double near = BT_NEAR * p->tolerance;
-    double sum = 0;
-    int64_t rows = 0, bad = 0;
+    const double slop = w->par.slop;
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
-    for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        const bt_contact *u = &cell->contacts[j];
-        const bt_gaps *g = &cell->gaps[j];
-        double worst = 0;
-        bool on = p->plain;
-        for (int i = 0; i < u->n; i++) {
-            const double open = bt_opening(u, g, w->par.slop, i, &d[u->a], &d[u->b]);
-            const double r = fabs(bt_max(0, g->multiplier[i] - open * u->mn[i]) - g->multiplier[i]) * u->w[i];
-            worst = bt_max(worst, r);
-            sum += r * r;
-            on = on || g->multiplier[i] > 0 || g->multiplier[i] != cell->work.before[j][i] || !(open >= 0);
-        }
-        t->most = bt_max(t->most, worst);
-        bad += worst > near;
-        rows += u->n;
-        if (on) cell->work.list[cell->work.n_list++] = j;
-    }
-    bt_rounds_found(p, cell, sum, rows, bad, t);
+    const bt_found f = in_batches(cell, p->plain) ? bt_batch_projection_residual(cell, slop, d, w->bodies.inv, p)
+                                                  : residual_in_place(cell, slop, d, p);
+    t->most = bt_max(t->most, f.most);
+    bt_rounds_found(p, cell, &f, t);
 }
 
 static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -72,7 +89,7 @@ static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     const bt_sweep *o = context;
     bt_cell *cell = &w->cells->cell[k];
     if (cell->work.n_list == 0) return;
-    if (bt_batch_projects(cell) && !o->problem->plain) { // fields are shaken plain, and keep their bits
+    if (in_batches(cell, o->problem->plain)) {
         int64_t done = 0;
         double most = 0;
         const double against = bt_batch_project(cell, w->par.slop, w->solver->shift, w->bodies.inv, o, &done, &most);
@@ -84,22 +101,22 @@ static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_moved moved;
     if (o->moves) bt_moved_begin(&moved, cell);
     for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++) {
-        const bt_idx u = cell->work.list[j];
-        bt_rounds_move(o, cell->gaps[u].multiplier, cell->work.before[u], moved.y[j], 2);
+        bt_in_place *u = &cell->work.in_place[cell->work.list[j]];
+        bt_rounds_move(o, u->multiplier, u->before, moved.y[j], 2);
     }
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx u = cell->work.list[j];
-        t->most = bt_max(t->most, bt_project_contact(&cell->contacts[u], &cell->gaps[u], w->par.slop,
-                                                     w->solver->shift, w->bodies.inv));
+        bt_in_place *p = &cell->work.in_place[u];
+        t->most = bt_max(t->most, bt_project_contact(&cell->contacts[u], &p->mass, &cell->gaps[u], p->multiplier,
+                                                     w->par.slop, w->solver->shift, w->bodies.inv));
     }
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->work.n_list);
     if (!o->moves) return;
     double against = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx u = cell->work.list[j];
+        const bt_in_place *u = &cell->work.in_place[cell->work.list[j]];
         for (int i = 0; i < 2; i++)
-            against += bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].multiplier[i], cell->work.before[u][i],
-                                         moved.y[j][i]);
+            against += bt_rounds_against(u->mass.w[i], u->multiplier[i], u->before[i], moved.y[j][i]);
     }
     bt_moved_end(&moved, cell, o, against, t);
 }

@@ -46,19 +46,29 @@ void bt_rounds_list(bt_cell *cell)
     if (cell->n_contacts <= cell->work.cap_list) return;
     cell->work.cap_list = cell->n_contacts + cell->n_contacts / 8;
     free(cell->work.list);
-    free(cell->work.before);
     cell->work.list = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.list);
-    cell->work.before = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.before);
 }
 
-void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t)
+void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 {
-    cell->work.bad = bad > 0;
-    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(squares * p->per_square, p->most_squares));
-    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)rows);
+    bt_work_list *k = &cell->work;
+    if (cell->n_contacts > k->cap_in_place) {
+        k->cap_in_place = cell->n_contacts + cell->n_contacts / 8;
+        free(k->in_place);
+        k->in_place = bt_alloc_aligned((size_t)k->cap_in_place, sizeof *k->in_place);
+    }
+    for (bt_idx i = 0; i < cell->n_contacts; i++)
+        k->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
+}
+
+void bt_rounds_found(const bt_problem *p, bt_cell *cell, const bt_found *f, bt_totals *t)
+{
+    cell->work.bad = f->bad > 0;
+    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(f->squares * p->per_square, p->most_squares));
+    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)f->rows);
     bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
     bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
-    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)bad);
+    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)f->bad);
 }
 
 /// The bodies of the cell of body i may be moved.

@@ -43,8 +43,8 @@
 // any number of threads and ranks.
 //
 // Rejected: Anderson acceleration around the sweep, over all contacts or the listed ones (0.6 to 1.8 times the time of
-// the plain sweep in dense ice; histories of 240 B a contact and 96 B a floe, against 72 a listed contact, 24 a contact
-// and 32 a floe here); over-relaxation (1.3 helps without momentum and hurts with it); momentum with a step of its own
+// the plain sweep in dense ice; histories of 240 B a contact and 96 B a floe, against 24 a listed contact and 32 a floe
+// here); over-relaxation (1.3 helps without momentum and hurts with it); momentum with a step of its own
 // for each cell or contact; sweeps in alternating direction; proximal Newton steps over the listed contacts (M + Jᵀ D J
 // of the velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which
 // a handful of contacts is left, but where a wedge drives its impulses up over thousands of sweeps a Newton step takes
@@ -57,6 +57,7 @@
 
 #include <stdlib.h>
 
+#include "contact/row.h"
 #include "space/cells.h"
 #include "space/phases.h"
 
@@ -111,8 +112,18 @@ typedef struct bt_work {
 /// Scales of the exact sums for a tolerance of the residual, the largest mass and the number of cells.
 void bt_rounds_scale(bt_problem *p, const bt_cells *t);
 
-/// Room for the list of a cell: what a residual pass calls before it lists.
+/// What a contact needs that is swept where it is, and not in a batch.
+typedef struct bt_in_place {
+    bt_mass mass;
+    double before[3];     ///< unknowns before the last sweep
+    double multiplier[2]; ///< multipliers of the position projection, kg m
+} bt_in_place;
+
+/// An empty list for a cell with room for all its contacts: what a residual pass calls before it lists.
 void bt_rounds_list(bt_cell *cell);
+
+/// Masses of the contacts of a cell that are going to be swept where they are.
+void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv);
 
 /// Collective. A residual pass over all contacts, after a settling if so, and what it found, into *work.
 void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
@@ -124,8 +135,14 @@ double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
 /// pass that found it not to be.
 void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// What a residual pass has found in a cell: squares of the residual and rows, contacts far from the tolerance.
-void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t);
+/// What a residual pass finds in a cell.
+typedef struct bt_found {
+    double most, squares;
+    int64_t rows, bad;    ///< bad: contacts far from the tolerance
+} bt_found;
+
+/// Into the totals: what a residual pass has found in a cell, but for the largest.
+void bt_rounds_found(const bt_problem *p, bt_cell *cell, const bt_found *f, bt_totals *t);
 
 enum { BT_MOVED_FEW = 192 };
 /// Unknowns of the listed contacts of a cell after their move.

@@ -56,15 +56,19 @@ static bt_tow *line_of(const bt_world *w, bt_idx cell)
 // --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
 
 /// Impulses of the last step, without what a new geometry, or a bound, no longer allows; nothing moves yet.
-static void start_impulses(bt_cell *cell)
+static void start_impulses(bt_cell *cell, const bt_inv *inv)
 {
+    const bool in_place = !bt_batch_is_for(cell);
     bt_rounds_list(cell);
+    bt_batch_begin(cell);
+    if (in_place) bt_rounds_in_place(cell, inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *u = &cell->contacts[i];
         for (int j = 0; cell->laws.limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);
         if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
         else bt_onto_disc(cell->laws.limits[i].flat[0], &u->ln[0], &u->lt);
-        double *x = cell->work.before[i];
+        if (!in_place) continue;
+        double *x = cell->work.in_place[i].before;
         x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
     }
 }
@@ -76,7 +80,7 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     bt_vel *v = w->bodies.vel;
     const bt_inv *inv = w->bodies.inv;
     bt_batch_unpack(cell);
-    if (warm) start_impulses(cell);
+    if (warm) start_impulses(cell, inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *u = &cell->contacts[i];
         const double total = u->ln[0] + u->ln[1];
@@ -98,25 +102,21 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     if (warm) bt_tow_update(line, towed, by);
 }
 
-/// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
-static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+/// Of the contacts of a cell that is swept in place.
+static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_problem *p)
 {
-    const bt_problem *p = context;
-    bt_cell *cell = &w->cells->cell[k];
-    const bt_vel *v = w->bodies.vel;
     const double near = BT_NEAR * p->tolerance;
-    double sum = 0;
-    int64_t rows = 0, bad = 0;
-    bt_batch_unpack(cell);
-    bt_rounds_list(cell);
+    bt_found f = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *u = &cell->contacts[i];
+        const bt_mass *m = &cell->work.in_place[i].mass;
         const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        const double r = limit ? bt_contact_residual(u, limit, v, &sum) : bt_contact_residual(u, NULL, v, &sum);
-        t->most = bt_max(t->most, r);
-        bad += r > near;
-        rows += u->n + 1 + (u->n == 0);
-        const double *x = cell->work.before[i];
+        const double r =
+            limit ? bt_contact_residual(u, m, limit, v, &f.squares) : bt_contact_residual(u, m, NULL, v, &f.squares);
+        f.most = bt_max(f.most, r);
+        f.bad += r > near;
+        f.rows += u->n + 1 + (u->n == 0);
+        const double *x = cell->work.in_place[i].before;
         // or did before the last sweep
         bool on =
             p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
@@ -124,15 +124,28 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) cell->work.list[cell->work.n_list++] = i;
     }
+    return f;
+}
+
+/// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
+static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    const bt_problem *p = context;
+    bt_cell *cell = &w->cells->cell[k];
+    const bt_vel *v = w->bodies.vel;
+    bt_batch_unpack(cell);
+    bt_rounds_list(cell);
+    bt_found f = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, w->bodies.inv, p) : residual_in_place(cell, v, p);
+    t->most = bt_max(t->most, f.most);
     const bt_tow *line = line_of(w, k);
     if (line) {
         const double r = bt_tow_residual(line, &v[bt_world_towed(w)]);
         t->most = bt_max(t->most, r);
-        sum += r * r;
-        rows++;
-        bad += r > near;
+        f.squares += r * r;
+        f.rows++;
+        f.bad += r > BT_NEAR * p->tolerance;
     }
-    bt_rounds_found(p, cell, sum, rows, bad, t);
+    bt_rounds_found(p, cell, &f, t);
 }
 
 static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -175,7 +188,7 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
         const bt_idx i = cell->work.list[j];
         fetch_ahead(cell, j + AHEAD);
         const bt_limit *k = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        most = bt_max(most, bt_update_contact(&cell->contacts[i], k, v, inv));
+        most = bt_max(most, bt_update_contact(&cell->contacts[i], &cell->work.in_place[i].mass, k, v, inv));
     }
     return most;
 }
@@ -184,7 +197,7 @@ static void move_contacts(const bt_sweep *o, bt_cell *cell, double (*y)[3])
 {
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         bt_contact *u = &cell->contacts[cell->work.list[j]];
-        double *x = cell->work.before[cell->work.list[j]];
+        double *x = cell->work.in_place[cell->work.list[j]].before;
         bt_rounds_move(o, u->ln, x, y[j], 2);
         bt_rounds_move(o, &u->lt, x + 2, y[j] + 2, 1);
     }
@@ -195,9 +208,11 @@ static double contacts_against(const bt_cell *cell, double (*y)[3])
     double sum = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_contact *u = &cell->contacts[cell->work.list[j]];
-        const double *x = cell->work.before[cell->work.list[j]];
-        sum += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
-               bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
+        const bt_in_place *o = &cell->work.in_place[cell->work.list[j]];
+        const bt_mass *m = &o->mass;
+        const double *x = o->before;
+        sum += bt_rounds_against(m->w[0], u->ln[0], x[0], y[j][0]) +
+               bt_rounds_against(m->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(m->wt, u->lt, x[2], y[j][2]);
     }
     return sum;
 }

@@ -18,12 +18,13 @@ bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 static void free_work(bt_work_list *k)
 {
     free(k->list);
-    free(k->before);
+    free(k->in_place);
     free(k->batch);
     k->list = NULL;
-    k->before = NULL;
+    k->in_place = NULL;
     k->batch = NULL;
-    k->n_list = k->cap_list = k->n_batches = k->cap_batches = 0;
+    k->n_list = k->cap_list = k->cap_in_place = k->n_batches = 0;
+    k->batch_bytes = 0;
 }
 
 void bt_cells_rest(bt_cells *t)

@@ -57,30 +57,27 @@ typedef struct bt_pair {
 } bt_pair;
 _Static_assert(sizeof(bt_pair) == 32, "a floe in dense ice has three, and each is kept from step to step");
 
-/// One manifold, in three cache lines: what batches are packed from (solve/batch.h); in the last cell and under rising
-/// bounds a sweep reads it itself, and writes the last line. Its two points are on a line along the tangent, so both
-/// have the same tangential row.
+/// One manifold, in two cache lines: what batches are packed from (solve/batch.h), four contacts at a time, each a line
+/// of four numbers after the other; in the last cell and under rising bounds a sweep reads it itself, and writes the
+/// second line. Its two points are on a line along the tangent, so both have the same tangential row. Its effective
+/// masses follow from the arms and the bodies (contact/row.h): they are formed where they are used, which takes less
+/// time than reading them would, and are not kept but where sweeps need them again and again.
 typedef struct bt_contact {
-    bt_idx a, b;
     double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
-    double ran[2], rbn[2]; ///< ra×n, rb×n of each point, m
     double rat, rbt;       ///< ra×t, rb×t, m
-    double w[2], w12;      ///< W of the normals and their coupling, 1/kg
-    double mn[2];          ///< 1/W, kg; 0 for the second of one point
-    double per_det;        ///< 1/(W1 W2 − W12²), kg²; 0 when singular or one point
-    double wt, mt;         ///< W of the tangent and its inverse
+    double ran[2], rbn[2]; ///< ra×n, rb×n of each point, m
     double bias[2];        ///< b of the normals, m/s
     double mu;
+    bt_idx a, b;
     double ln[2], lt;      ///< impulse on b, N s
     int32_t n;             ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
     bt_idx pair;           ///< its pair in the cell
 } bt_contact;
-_Static_assert(sizeof(bt_contact) == 192, "three cache lines");
+_Static_assert(sizeof(bt_contact) == 128, "two cache lines; four lines of four numbers (solve/rows.h)");
 
 /// What the sweep does not see of it.
 typedef struct bt_gaps {
     double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
-    double multiplier[2];  ///< multipliers of the position projection, kg m
     uint32_t feature[2];   ///< of the points
 } bt_gaps;
 
@@ -120,11 +117,14 @@ typedef struct bt_law_state {
 /// The contacts of a cell that are swept (solve/rounds.h).
 typedef struct bt_work_list {
     bt_idx *list;                   ///< [n_list] ascending
-    double (*before)[3];            ///< [n_contacts] unknowns before the last sweep
     double (*best)[3];              ///< [n_contacts] of the best residual pass, while they are kept; otherwise NULL
     bt_idx n_list, cap_list;
-    struct bt_batch *batch;         ///< [n_batches] the listed contacts again (solve/batch.h)
-    bt_idx n_batches, cap_batches;
+    /// [n_contacts] of a cell whose contacts are swept where they are, otherwise NULL (solve/rounds.h)
+    struct bt_in_place *in_place;
+    bt_idx cap_in_place;
+    struct bt_batch *batch;         ///< [n_batches] the contacts that were listed last, again (solve/batch.h)
+    bt_idx n_batches;
+    size_t batch_bytes;
     bool packed;                    ///< their impulses are there, and not in the contacts
     int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
     bool bad;                       ///< some contact is not yet near the tolerance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sweeps in batches against the scalar update, contact by contact in the same order: equal bit for bit; and what may
-// stand together in a batch.
+// Sweeps in batches, and residual passes four at a time, against the scalar update, contact by contact in the same
+// order: equal bit for bit; and what may stand together in a batch.
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ typedef struct {
     bt_contact contacts[CONTACTS];
     bt_gaps gaps[CONTACTS];
     bt_limit limits[CONTACTS];
-    double before[CONTACTS][3];
+    bt_in_place in_place[CONTACTS]; // of the scalar update
     bt_idx list[CONTACTS];
     bt_vel v[BODIES];
     bt_inv inv[BODIES];
@@ -25,38 +25,30 @@ typedef struct {
 
 static double any(uint64_t *rng) { return 2 * scene_uniform(rng) - 1; }
 
+/// Of those with two points some have them in one place.
 static bt_contact random_contact(uint64_t *rng, const bt_inv *inv)
 {
     bt_contact u = {.n = 1 + (scene_uniform(rng) < 0.6), .mu = 0.5 * scene_uniform(rng)};
     u.a = (bt_idx)(BODIES * scene_uniform(rng));
     do u.b = (bt_idx)(BODIES * scene_uniform(rng));
     while (u.b == u.a || inv[u.a].m + inv[u.b].m == 0);
-    const bt_inv p = inv[u.a], q = inv[u.b];
     const double turn = 7 * scene_uniform(rng);
     u.nx = cos(turn), u.ny = sin(turn);
     u.rat = any(rng), u.rbt = any(rng);
-    u.wt = p.m + q.m + p.i * u.rat * u.rat + q.i * u.rbt * u.rbt;
-    u.mt = 1 / u.wt;
     for (int i = 0; i < 2; i++) { // levers of a point that is not there have no effect
         u.ran[i] = any(rng), u.rbn[i] = any(rng);
-        u.w[i] = p.m + q.m + p.i * u.ran[i] * u.ran[i] + q.i * u.rbn[i] * u.rbn[i];
         if (i >= u.n) continue;
-        u.mn[i] = 1 / u.w[i];
         u.bias[i] = any(rng);
         u.ln[i] = bt_max(0, any(rng));
     }
     u.lt = any(rng) * u.mu * (u.ln[0] + u.ln[1]);
-    if (u.n == 1) return u;
-    u.w12 = p.m + q.m + p.i * u.ran[0] * u.ran[1] + q.i * u.rbn[0] * u.rbn[1];
-    const double det = u.w[0] * u.w[1] - u.w12 * u.w12;
-    u.per_det = scene_uniform(rng) < 0.9 ? 1 / det : 0;
+    if (scene_uniform(rng) < 0.1) u.ran[1] = u.ran[0], u.rbn[1] = u.rbn[0];
     return u;
 }
 
 /// Sheets between the bodies of a contact: two components, one step length.
-static void make_sheets(bt_contact *u, const bt_inv *inv, uint64_t *rng)
+static void make_sheets(bt_contact *u, uint64_t *rng)
 {
-    const bt_inv p = inv[u->a], q = inv[u->b];
     *u = (bt_contact){.a = u->a,
                       .b = u->b,
                       .nx = 1,
@@ -66,9 +58,6 @@ static void make_sheets(bt_contact *u, const bt_inv *inv, uint64_t *rng)
                       .rbt = any(rng),
                       .ln = {any(rng)},
                       .lt = any(rng)};
-    u->w[0] = u->wt =
-        p.m + q.m + p.i * (u->ran[0] * u->ran[0] + u->rat * u->rat) + q.i * (u->rbn[0] * u->rbn[0] + u->rbt * u->rbt);
-    u->mn[0] = u->mt = 1 / u->wt;
 }
 
 /// Flat bounds for all contacts; a third of them become sheets.
@@ -79,7 +68,7 @@ static void bind(knot_of_floes *s, uint64_t *rng)
         bt_limit *l = &s->limits[i];
         *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
         if (scene_uniform(rng) < 0.35) {
-            make_sheets(&s->contacts[i], s->inv, rng);
+            make_sheets(&s->contacts[i], rng);
             l->flat[0] = scene_uniform(rng) < 0.1 ? 0 : scene_uniform(rng);
         } else if (scene_uniform(rng) < 0.8) {
             for (int c = 0; c < s->contacts[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
@@ -95,13 +84,27 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
     s->cell =
-        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .work.before = s->before,
-                  .work.list = s->list};
+        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .work.list = s->list};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         s->contacts[i] = random_contact(rng, s->inv);
-        for (int c = 0; c < 3; c++) s->before[i][c] = any(rng);
         if (scene_uniform(rng) < listed) s->list[s->cell.work.n_list++] = i;
     }
+}
+
+/// What the scalar update has beside the contacts; their impulses are those before the last sweep.
+static void set_out(knot_of_floes *s)
+{
+    for (bt_idx i = 0; i < CONTACTS; i++) {
+        const bt_contact *u = &s->contacts[i];
+        s->in_place[i] = (bt_in_place){.mass = bt_mass_of(u, s->inv), .before = {u->ln[0], u->ln[1], u->lt}};
+    }
+}
+
+/// All contacts into the list.
+static void list_all(bt_cell *cell)
+{
+    for (bt_idx i = 0; i < CONTACTS; i++) cell->work.list[i] = i;
+    cell->work.n_list = CONTACTS;
 }
 
 /// The same visit with the scalar update; returns what it turned against its move.
@@ -110,23 +113,25 @@ static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep
     static double y[CONTACTS][3];
     for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
         bt_contact *u = &s->contacts[order[j]];
-        bt_rounds_move(o, u->ln, s->before[order[j]], y[j], 2);
-        bt_rounds_move(o, &u->lt, s->before[order[j]] + 2, y[j] + 2, 1);
+        bt_rounds_move(o, u->ln, s->in_place[order[j]].before, y[j], 2);
+        bt_rounds_move(o, &u->lt, s->in_place[order[j]].before + 2, y[j] + 2, 1);
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
         for (bt_idx j = 0; j < s->cell.work.n_list; j++) {
             const bt_limit *l = s->cell.laws.limits ? &s->limits[order[j]] : NULL;
-            largest = bt_max(largest, bt_update_contact(&s->contacts[order[j]], l, s->v, s->inv));
+            const bt_mass *m = &s->in_place[order[j]].mass;
+            largest = bt_max(largest, bt_update_contact(&s->contacts[order[j]], m, l, s->v, s->inv));
         }
         if (n == 0) *most = largest;
     }
     double against = 0;
     for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
         const bt_contact *u = &s->contacts[order[j]];
-        const double *x = s->before[order[j]];
-        against += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
-                   bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
+        const bt_mass *m = &s->in_place[order[j]].mass;
+        const double *x = s->in_place[order[j]].before;
+        against += bt_rounds_against(m->w[0], u->ln[0], x[0], y[j][0]) +
+                   bt_rounds_against(m->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(m->wt, u->lt, x[2], y[j][2]);
     }
     return against;
 }
@@ -138,6 +143,36 @@ static void swept_order(const bt_cell *cell, bt_idx *contact)
         for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
 }
 
+/// The residual pass four at a time against one by one, sums included, bit for bit.
+static void check_residual(knot_of_floes *four, knot_of_floes *one)
+{
+    const bt_problem p = {.tolerance = 1e-3};
+    bt_idx list[CONTACTS], n = 0;
+    const bt_idx n_list = four->cell.work.n_list;
+    memcpy(list, four->list, sizeof list);
+    four->cell.work.n_list = 0;
+    const bt_found f = bt_batch_residual(&four->cell, four->v, four->inv, &p);
+    bt_found e = {0};
+    for (bt_idx i = 0; i < CONTACTS; i++) {
+        const bt_contact *u = &one->contacts[i];
+        const bt_limit *k = one->cell.laws.limits ? &one->limits[i] : NULL;
+        const bt_mass *m = &one->in_place[i].mass;
+        const double r = bt_contact_residual(u, m, k, one->v, &e.squares), *x = one->in_place[i].before;
+        e.most = bt_max(e.most, r);
+        e.rows += u->n > 0 ? u->n + 1 : 2;
+        e.bad += r > BT_NEAR * p.tolerance;
+        bool on = u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
+        if (u->n == 0) on = on || r > 0;
+        for (int c = 0; c < u->n; c++)
+            on = on || !(bt_normal_velocity(u, c, &one->v[u->a], &one->v[u->b]) + u->bias[c] >= 0);
+        if (on) assert_true(n < four->cell.work.n_list && four->list[n] == i), n++;
+    }
+    assert_int_equal(n, four->cell.work.n_list);
+    assert_true(f.most == e.most && f.squares == e.squares && f.rows == e.rows && f.bad == e.bad);
+    memcpy(four->list, list, sizeof list);
+    four->cell.work.n_list = n_list;
+}
+
 static void batches_do_what_single_updates_do(void **state)
 {
     (void)state;
@@ -147,42 +182,45 @@ static void batches_do_what_single_updates_do(void **state)
     for (int k = 0; k < 300; k++) {
         fill(&four, &rng, k % 3 ? 0.8 : 0.03);
         if (k % 5 > 1) bind(&four, &rng);
+        set_out(&four);
         one = four;
-        const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
         const int times = 1 + k % 3;
-        int64_t done = 0;
-        double most = 0, most_of_one = 0;
-        const double against = bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, 0, &done, &most);
-        assert_true(four.cell.work.packed);
-        assert_int_equal(done, times * four.cell.work.n_list);
-        swept_order(&four.cell, order);
-        CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-12 * (1 + fabs(against)));
-        bt_batch_unpack(&four.cell);
-        assert_false(four.cell.work.packed);
-        CHECK_CLOSE(most, most_of_one, 0);
-        for (int i = 0; i < BODIES; i++) {
-            assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
-            if (i % 7 == 0) assert_memory_equal(&four.v[i], &one.v[i], sizeof *four.v);
-        }
-        for (bt_idx i = 0; i < CONTACTS; i++) {
-            const bt_contact *p = &four.contacts[i], *q = &one.contacts[i];
-            assert_true(p->ln[0] == q->ln[0] && p->ln[1] == q->ln[1] && p->lt == q->lt);
-            assert_memory_equal(four.before[i], one.before[i], sizeof *four.before);
+        // A list, and then another, in which contacts that were in the first move on.
+        for (int round = 0; round < 2; round++) {
+            if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
+            const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
+            int64_t done = 0;
+            double most = 0, most_of_one = 0;
+            const double against = bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, 0, &done, &most);
+            assert_true(four.cell.work.packed);
+            assert_int_equal(done, times * four.cell.work.n_list);
+            swept_order(&four.cell, order);
+            CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-11 * (1 + fabs(against)));
+            bt_batch_unpack(&four.cell);
+            assert_false(four.cell.work.packed);
+            CHECK_CLOSE(most, most_of_one, 0);
+            for (int i = 0; i < BODIES; i++) {
+                assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
+                if (i % 7 == 0) assert_memory_equal(&four.v[i], &one.v[i], sizeof *four.v);
+            }
+            for (bt_idx i = 0; i < CONTACTS; i++) {
+                const bt_contact *p = &four.contacts[i], *q = &one.contacts[i];
+                assert_true(p->ln[0] == q->ln[0] && p->ln[1] == q->ln[1] && p->lt == q->lt);
+            }
+            check_residual(&four, &one);
         }
         free(four.cell.work.batch);
     }
 }
 
-/// Overlaps and multipliers for the position projection of contacts, of which some are sheets.
+/// Overlaps for the position projection of contacts, of which some are sheets.
 static void overlap(knot_of_floes *s, uint64_t *rng)
 {
     for (bt_idx i = 0; i < CONTACTS; i++) {
-        if (scene_uniform(rng) < 0.1) make_sheets(&s->contacts[i], s->inv, rng);
+        if (scene_uniform(rng) < 0.1) make_sheets(&s->contacts[i], rng);
         for (int c = 0; c < s->contacts[i].n; c++) {
             s->gaps[i].gap[c] = any(rng);
-            s->gaps[i].multiplier[c] = bt_max(0, any(rng));
         }
-        for (int c = s->contacts[i].n; c < 3; c++) s->before[i][c] = 0;
     }
 }
 
@@ -192,14 +230,51 @@ static double scalar_projection(knot_of_floes *s, const bt_idx *order, double sl
     static double y[CONTACTS][3];
     double sum = 0;
     for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++)
-        bt_rounds_move(o, s->gaps[order[j]].multiplier, s->before[order[j]], y[j], 2);
-    for (bt_idx j = 0; j < s->cell.work.n_list; j++)
-        *most = bt_max(*most, bt_project_contact(&s->contacts[order[j]], &s->gaps[order[j]], slop, s->v, s->inv));
-    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++)
-        for (int c = 0; c < 2; c++)
-            sum += bt_rounds_against(s->contacts[order[j]].w[c], s->gaps[order[j]].multiplier[c],
-                                     s->before[order[j]][c], y[j][c]);
+        bt_rounds_move(o, s->in_place[order[j]].multiplier, s->in_place[order[j]].before, y[j], 2);
+    for (bt_idx j = 0; j < s->cell.work.n_list; j++) {
+        bt_in_place *p = &s->in_place[order[j]];
+        *most = bt_max(*most, bt_project_contact(&s->contacts[order[j]], &p->mass, &s->gaps[order[j]], p->multiplier,
+                                                 slop, s->v, s->inv));
+    }
+    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
+        const bt_in_place *p = &s->in_place[order[j]];
+        for (int c = 0; c < 2; c++) sum += bt_rounds_against(p->mass.w[c], p->multiplier[c], p->before[c], y[j][c]);
+    }
     return sum;
+}
+
+/// As check_residual.
+static void check_projection_residual(knot_of_floes *four, knot_of_floes *one, double slop)
+{
+    const bt_problem p = {.tolerance = 1e-3};
+    bt_idx list[CONTACTS], n = 0;
+    const bt_idx n_list = four->cell.work.n_list;
+    memcpy(list, four->list, sizeof list);
+    four->cell.work.n_list = 0;
+    const bt_found f = bt_batch_projection_residual(&four->cell, slop, four->v, four->inv, &p);
+    bt_found e = {0};
+    for (bt_idx i = 0; i < CONTACTS; i++) {
+        const bt_contact *u = &one->contacts[i];
+        const bt_in_place *o = &one->in_place[i];
+        double worst = 0;
+        bool on = false;
+        for (int c = 0; c < u->n; c++) {
+            const double open = bt_opening(u, &one->gaps[i], slop, c, &one->v[u->a], &one->v[u->b]),
+                         x = o->multiplier[c];
+            const double r = fabs(bt_max(0, x - open * o->mass.mn[c]) - x) * o->mass.w[c];
+            worst = bt_max(worst, r);
+            e.squares += r * r;
+            on = on || x > 0 || x != o->before[c] || !(open >= 0);
+        }
+        e.most = bt_max(e.most, worst);
+        e.rows += u->n;
+        e.bad += worst > BT_NEAR * p.tolerance;
+        if (on) assert_true(n < four->cell.work.n_list && four->list[n] == i), n++;
+    }
+    assert_int_equal(n, four->cell.work.n_list);
+    assert_true(f.most == e.most && f.squares == e.squares && f.rows == e.rows && f.bad == e.bad);
+    memcpy(four->list, list, sizeof list);
+    four->cell.work.n_list = n_list;
 }
 
 static void batches_project_as_single_updates_do(void **state)
@@ -211,23 +286,34 @@ static void batches_project_as_single_updates_do(void **state)
     for (int k = 0; k < 200; k++) {
         fill(&four, &rng, k % 3 ? 0.8 : 0.03);
         overlap(&four, &rng);
+        set_out(&four);
+        for (bt_idx i = 0; i < CONTACTS; i++) memset(four.in_place[i].before, 0, sizeof four.in_place[i].before);
         one = four;
-        const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
         const double slop = 0.1 * scene_uniform(&rng);
-        int64_t done = 0;
-        double most = 0, most_of_one = 0;
-        const double against = bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &done, &most);
-        assert_int_equal(done, four.cell.work.n_list);
-        swept_order(&four.cell, order);
-        CHECK_CLOSE(scalar_projection(&one, order, slop, &o, &most_of_one), against, 1e-12 * (1 + fabs(against)));
-        bt_batch_unpack(&four.cell);
-        CHECK_CLOSE(most, most_of_one, 0);
-        for (int i = 0; i < BODIES; i++)
-            assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
-        for (bt_idx i = 0; i < CONTACTS; i++) {
-            for (int c = 0; c < four.contacts[i].n; c++)
-                assert_true(four.gaps[i].multiplier[c] == one.gaps[i].multiplier[c]);
-            assert_memory_equal(&four.contacts[i], &one.contacts[i], sizeof four.contacts[i]);
+        for (int round = 0; round < 2; round++) {
+            if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
+            const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
+            int64_t done = 0;
+            double most = 0, most_of_one = 0;
+            const double against = bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &done, &most);
+            assert_int_equal(done, four.cell.work.n_list);
+            swept_order(&four.cell, order);
+            CHECK_CLOSE(scalar_projection(&one, order, slop, &o, &most_of_one), against, 1e-11 * (1 + fabs(against)));
+            bt_batch_unpack(&four.cell);
+            CHECK_CLOSE(most, most_of_one, 0);
+            for (int i = 0; i < BODIES; i++)
+                assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
+            for (bt_idx i = 0; i < four.cell.work.n_batches; i++) {
+                const bt_batch *q = &four.cell.work.batch[i];
+                for (int l = 0; l < q->n; l++)
+                    for (int c = 0; c < 2; c++) {
+                        assert_true(q->x[c][l] == one.in_place[q->contact[l]].multiplier[c]);
+                        if (o.moves) assert_true(q->before[c][l] == one.in_place[q->contact[l]].before[c]);
+                    }
+            }
+            for (bt_idx i = 0; i < CONTACTS; i++)
+                assert_memory_equal(&four.contacts[i], &one.contacts[i], sizeof four.contacts[i]);
+            check_projection_residual(&four, &one, slop);
         }
         free(four.cell.work.batch);
     }
