@@ -77,7 +77,7 @@ void bt_laws_prune(const bt_world *w, bt_cell *t)
 void bt_laws_reserve(bt_cell *t)
 {
     if (t->n_contacts <= t->laws.cap_limits) return;
-    t->laws.cap_limits = t->n_contacts + t->n_contacts / 8;
+    t->laws.cap_limits = bt_cells_room(t->n_contacts);
     free(t->laws.limits);
     t->laws.limits = bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.limits);
 }

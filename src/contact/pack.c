@@ -172,7 +172,7 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
     bt_cell *t = &w->cells->cell[k];
     hold(t, s);
     if ((bt_idx)s->n > t->cap_contacts) {
-        t->cap_contacts = (bt_idx)(s->n + s->n / 8);
+        t->cap_contacts = bt_cells_room((bt_idx)s->n);
         free(t->contacts);
         free(t->gaps);
         t->contacts = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->contacts);

@@ -44,7 +44,7 @@ void bt_rounds_list(bt_cell *cell)
     cell->work.n_list = 0;
     cell->work.bad = false;
     if (cell->n_contacts <= cell->work.cap_list) return;
-    cell->work.cap_list = cell->n_contacts + cell->n_contacts / 8;
+    cell->work.cap_list = bt_cells_room(cell->n_contacts);
     free(cell->work.list);
     cell->work.list = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.list);
 }
@@ -53,7 +53,7 @@ void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 {
     bt_work_list *k = &cell->work;
     if (cell->n_contacts > k->cap_in_place) {
-        k->cap_in_place = cell->n_contacts + cell->n_contacts / 8;
+        k->cap_in_place = bt_cells_room(cell->n_contacts);
         free(k->in_place);
         k->in_place = bt_alloc_aligned((size_t)k->cap_in_place, sizeof *k->in_place);
     }

@@ -2,6 +2,9 @@
 // Sweeps to tolerance; equations and order in solve/solver.h.
 #include "solve/solver.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,6 +48,10 @@ void bt_solver_rest(bt_world *w)
 {
     give_back(w->solver);
     bt_cells_rest(w->cells);
+#ifdef __GLIBC__
+    // Free pieces of some kilobytes between pieces in use are of no use to arrays of all floes, and would stay.
+    malloc_trim(0);
+#endif
 }
 
 /// The line, in the pass of the last cell on the rank that owns the large bodies.

@@ -45,7 +45,7 @@
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
 
 /// A pair near enough to be looked at.
-typedef struct bt_pair {
+typedef struct __attribute__((packed, aligned(4))) bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
     /// that of its points in the cell when last looked for, not of sheets; −1 = none. It hands its features and
     /// impulses on to the contact that takes its place
@@ -55,7 +55,7 @@ typedef struct bt_pair {
     /// gap when last computed + path lengths of a and b then: no contact while paths + margin < reach
     double reach;
 } bt_pair;
-_Static_assert(sizeof(bt_pair) == 32, "a floe in dense ice has three, and each is kept from step to step");
+_Static_assert(sizeof(bt_pair) == 28, "a floe in dense ice has four, and each is kept from step to step");
 
 /// One manifold, in two cache lines: what batches are packed from (solve/batch.h), four contacts at a time, each a line
 /// of four numbers after the other; in the last cell and under rising bounds a sweep reads it itself, and writes the
@@ -250,6 +250,10 @@ bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]
 
 /// Coordinate c around a periodic direction of n cells.
 static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
+
+/// Room for n of what a cell has: a few more, or every step in which ice is pressed together would need new memory,
+/// and no more than a few, or dense ice would take a tenth more memory.
+static inline bt_idx bt_cells_room(bt_idx n) { return n + n / 32 + 1; }
 
 /// Index of the cell at (x, y), −1 = not here.
 static inline bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y)

@@ -286,7 +286,7 @@ static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
             s->found[i] = t->search.pairs[k];
     }
     if (n > (size_t)t->search.cap_pairs) {
-        t->search.cap_pairs = (bt_idx)(n + n / 8);
+        t->search.cap_pairs = bt_cells_room((bt_idx)n);
         free(t->search.pairs);
         t->search.pairs = bt_realloc(NULL, (size_t)t->search.cap_pairs, sizeof *t->search.pairs);
     }
@@ -325,7 +325,7 @@ bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin)
 void bt_pairs_add_near(bt_cell *t, bt_idx i)
 {
     if (t->search.n_near == t->search.cap_near) {
-        t->search.cap_near += t->search.cap_near / 4 + 8;
+        t->search.cap_near += t->search.cap_near / 8 + 4;
         t->search.near = bt_realloc(t->search.near, (size_t)t->search.cap_near, sizeof *t->search.near);
     }
     t->search.near[t->search.n_near++] = i;
