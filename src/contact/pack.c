@@ -173,12 +173,11 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
     hold(t, s);
     if ((bt_idx)s->n > t->cap_contacts) {
         t->cap_contacts = bt_cells_room((bt_idx)s->n);
-        free(t->contacts);
         free(t->gaps);
-        t->contacts = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->contacts);
         t->gaps = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->gaps);
     }
     t->n_contacts = (bt_idx)s->n;
+    bt_cells_make_room(t, s->n * sizeof *t->contacts);
     if (s->n == 0) return;
     const bool bounded = bt_laws_on(&w->par);
     t->laws.rising = bt_laws_rise(&w->par);

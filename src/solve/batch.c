@@ -17,17 +17,27 @@ typedef bt_mask mask;
 
 typedef enum { RIGID, BOUNDED, SHEETS, PROJECTION } kind_of_batch;
 
-/// Names as in bt_contact and bt_mass; lanes without a contact are zero.
+/// Names as in bt_contact and bt_mass; lanes without a contact are zero. It is all there is of its contacts while they
+/// are packed.
 typedef struct bt_batch {
     vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2];
     vec mu;                    // friction; of the projection: the overlap that is left alone, m
     vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
     vec x[3], before[3];       // impulses, or multipliers: now, before the last sweep
-    bt_idx a[LANES], b[LANES], contact[LANES];
+    bt_idx a[LANES], b[LANES], contact[LANES], pair[LANES];
     bool moves_a[LANES], moves_b[LANES];
-    uint8_t n, kind;
+    uint8_t points[LANES], n, kind;
 } bt_batch;
-_Static_assert(sizeof(bt_batch) == 31 * sizeof(vec), "the listed contacts of dense ice, 248 bytes each");
+_Static_assert(sizeof(bt_batch) == 32 * sizeof(vec), "the listed contacts of dense ice, 256 bytes each");
+
+/// The projection has two unknowns and no friction, and keeps what it has no use for in the place of what it does not
+/// use.
+#define KEPT_BIAS_0 w12
+#define KEPT_BIAS_1 per_det
+#define KEPT_MU wt
+#define KEPT_LT mt
+#define KEPT_LN_0 x[2]
+#define KEPT_LN_1 before[2]
 
 /// Of the normals; [0] of sheets: the radius of their disc. After the batches of a cell whose contacts have bounds.
 typedef struct bounds {
@@ -35,6 +45,20 @@ typedef struct bounds {
 } bounds;
 
 static bounds *bounds_of(const bt_cell *cell) { return (bounds *)(cell->work.batch + cell->work.n_batches); }
+
+static size_t batch_bytes(const bt_cell *cell) { return sizeof(bt_batch) + (cell->laws.limits ? sizeof(bounds) : 0); }
+
+/// The records of the contacts that are not listed.
+static bt_contact *rest_of(const bt_cell *cell)
+{
+    return (bt_contact *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+}
+
+/// Of one contact: unknowns before the last sweep, and the multipliers of the projection.
+typedef struct bt_unknowns {
+    double before[3], multiplier[2];
+    bt_idx contact;
+} bt_unknowns;
 
 bool bt_batch_is_for(const bt_cell *cell)
 {
@@ -45,14 +69,14 @@ bool bt_batch_projects(const bt_cell *cell) { return cell->phase != BT_COLOURS; 
 
 size_t bt_batch_bytes(const bt_cell *cell)
 {
-    const size_t own = bt_batch_is_for(cell) ? (sizeof(bt_batch) + (cell->laws.limits ? sizeof(bounds) : 0)) / LANES
+    const size_t own = bt_batch_is_for(cell) ? batch_bytes(cell) / LANES
                                              : sizeof(bt_contact) + sizeof(bt_in_place) + 2 * sizeof(bt_inv);
     return own + 2 * sizeof(bt_vel);
 }
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
-void bt_batch_begin(bt_cell *cell) { cell->work.n_batches = 0; }
+void bt_batch_begin(bt_cell *cell) { cell->work.n_last = 0; }
 
 static kind_of_batch kind_of(const bt_cell *cell, const bt_contact *u, bool projection)
 {
@@ -65,17 +89,34 @@ typedef struct {
     uint8_t n, n_bodies, kind;
 } place;
 
-/// Unknowns before the last sweep, and the multipliers of the projection, of one contact.
-typedef struct {
-    double before[3], multiplier[2];
-} unknowns;
-
-/// What a thread needs to pack a cell: on its stack for nearly all cells, which have some sixty contacts.
+/// What a thread needs to pack a cell, or to unpack it: on its stack for nearly all cells, which have some sixty
+/// contacts. The records have to stand aside: they and the batches are in the same memory.
 enum { FEW = 128 };
 typedef struct {
     place few_places[FEW], *place;      // [n_list]
-    unknowns few_unknowns[FEW], *of;    // [n_contacts]
+    bt_unknowns few_unknowns[FEW], *of; // [n_contacts]
+    bt_contact few_records[FEW], *u;    // [n_contacts]
+    bool few_listed[FEW], *listed;      // [n_contacts]
 } packing;
+
+static void begin_packing(packing *s, const bt_cell *cell)
+{
+    const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->work.n_list;
+    const bool few = n <= FEW;
+    s->place = n_list > FEW ? bt_realloc(NULL, n_list, sizeof *s->place) : s->few_places;
+    s->of = few ? s->few_unknowns : bt_realloc(NULL, n, sizeof *s->of);
+    s->u = few ? s->few_records : bt_realloc(NULL, n, sizeof *s->u);
+    s->listed = few ? s->few_listed : bt_realloc(NULL, n, sizeof *s->listed);
+    if (n > 0) memset(s->listed, 0, n * sizeof *s->listed);
+}
+
+static void end_packing(packing *s)
+{
+    if (s->place != s->few_places) free(s->place);
+    if (s->of != s->few_unknowns) free(s->of);
+    if (s->u != s->few_records) free(s->u);
+    if (s->listed != s->few_listed) free(s->listed);
+}
 
 static bool holds(const place *o, bt_idx body)
 {
@@ -92,13 +133,13 @@ static bool fits(const place *o, kind_of_batch kind, const bt_idx body[2], int n
 
 /// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
 /// bodies that can be moved. Those that filled up leave the window. Returns the number of batches.
-static bt_idx deal(const bt_cell *cell, const bt_inv *inv, bool projection, place *o)
+static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv *inv, bool projection, place *o)
 {
     bt_idx open[OPEN], n_batches = 0;
     int n_open = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
-        const bt_contact *u = &cell->contacts[i];
+        const bt_contact *u = &contacts[i];
         const kind_of_batch kind = kind_of(cell, u, projection);
         bt_idx body[2];
         int n = 0, k = 0;
@@ -120,49 +161,33 @@ static bt_idx deal(const bt_cell *cell, const bt_inv *inv, bool projection, plac
     return n_batches;
 }
 
-/// What the sweeps of a problem hand on to the next list: it is in the batches of the last one. A contact that was not
-/// in them has not been moved since; it has no multiplier.
-static void take_unknowns(const bt_cell *cell, bool projection, unknowns *of)
+/// What the last list hands on to the next one. A contact that was not in it has not been moved since; it has no
+/// multiplier.
+static void take_unknowns(const bt_cell *cell, bool projection, packing *s)
 {
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
-        const bt_contact *u = &cell->contacts[i];
-        of[i] = projection ? (unknowns){0} : (unknowns){.before = {u->ln[0], u->ln[1], u->lt}};
+        const bt_contact *u = &s->u[i];
+        s->of[i] = projection ? (bt_unknowns){0} : (bt_unknowns){.before = {u->ln[0], u->ln[1], u->lt}};
+        s->listed[i] = true;
     }
-    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        const bt_batch *o = &cell->work.batch[k];
-        for (int l = 0; l < o->n; l++) {
-            unknowns *to = &of[o->contact[l]];
-            for (int c = 0; c < 3; c++) to->before[c] = o->before[c][l];
-            to->multiplier[0] = o->x[0][l], to->multiplier[1] = o->x[1][l];
-        }
-    }
-}
-
-/// Room for exactly so many batches: lists of a cell differ little from step to step, and most memory of dense ice is
-/// here.
-static void make_room(bt_cell *cell, bt_idx n_batches)
-{
-    const size_t bytes = (size_t)n_batches * (sizeof(bt_batch) + (cell->laws.limits ? sizeof(bounds) : 0));
-    cell->work.n_batches = n_batches;
-    if (bytes <= cell->work.batch_bytes) return;
-    free(cell->work.batch);
-    cell->work.batch = bt_alloc_aligned(cell->work.batch_bytes = bytes, 1);
+    for (bt_idx k = 0; k < cell->work.n_last; k++) s->of[cell->work.last[k].contact] = cell->work.last[k];
 }
 
 /// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
 /// have none.
-static void put_projection(bt_batch *o, const bt_cell *cell, const unknowns *of, double slop)
+static void put_projection(bt_batch *o, const bt_cell *cell, const bt_unknowns *of, double slop)
 {
+    o->KEPT_BIAS_0 = o->bias[0], o->KEPT_BIAS_1 = o->bias[1], o->KEPT_MU = o->mu;
+    o->KEPT_LN_1 = o->x[1], o->KEPT_LT = o->x[2], o->KEPT_LN_0 = o->x[0];
     for (int l = 0; l < o->n; l++) {
         const bt_idx i = o->contact[l];
         o->mu[l] = slop;
         for (int c = 0; c < 2; c++) {
-            o->bias[c][l] = c < cell->contacts[i].n ? cell->gaps[i].gap[c] : 0;
+            o->bias[c][l] = c < o->points[l] ? cell->gaps[i].gap[c] : 0;
             o->x[c][l] = of[i].multiplier[c];
         }
     }
-    o->x[2] = o->before[2] = (vec){0};
 }
 
 /// Masses of sheets one by one: they have a root.
@@ -174,19 +199,20 @@ static void put_sheets(bt_batch *o, const bt_contact *const u[LANES], const bt_i
     }
 }
 
-BT_INLINE void put(bt_batch *o, const bt_cell *cell, const place *p, const unknowns *of, const bt_inv *inv)
+BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const place *p, const bt_unknowns *of, const bt_inv *inv)
 {
     static const bt_contact nothing;
-    static const unknowns nowhere;
+    static const bt_unknowns nowhere;
     const bt_contact *u[LANES];
-    const unknowns *x[LANES];
+    const bt_unknowns *x[LANES];
     o->n = p->n, o->kind = p->kind;
     for (int l = 0; l < LANES; l++) {
         const bool there = l < p->n;
-        const bt_contact *at = &cell->contacts[p->contact[there ? l : 0]]; // empty lanes read its bodies, never write
+        const bt_contact *at = &contacts[p->contact[there ? l : 0]]; // empty lanes read its bodies, never write
         u[l] = there ? at : &nothing;
         x[l] = there ? &of[p->contact[l]] : &nowhere;
         o->a[l] = at->a, o->b[l] = at->b, o->contact[l] = there ? p->contact[l] : 0;
+        o->pair[l] = u[l]->pair, o->points[l] = (uint8_t)u[l]->n;
         o->moves_a[l] = there && inv[at->a].m > 0, o->moves_b[l] = there && inv[at->b].m > 0;
     }
     const bt_rows r = bt_rows_of(u);
@@ -207,45 +233,128 @@ BT_INLINE void put(bt_batch *o, const bt_cell *cell, const place *p, const unkno
     if (p->kind == SHEETS) put_sheets(o, u, inv);
 }
 
+/// n records, of which none lies in the other place; a call of the library takes longer for so few.
+BT_INLINE void copy_records(bt_contact *to, const bt_contact *from, bt_idx n)
+{
+    for (bt_idx i = 0; i < n; i++) {
+        vec line[4];
+        memcpy(line, &from[i], sizeof line);
+        memcpy(&to[i], line, sizeof line);
+    }
+}
+
 BT_FOR_EACH_CPU
-static void put_all(bt_cell *cell, const place *p, const unknowns *of, const bt_inv *inv, const double *slop)
+static void put_aside(const bt_cell *cell, bt_contact *u) { copy_records(u, cell->contacts, cell->n_contacts); }
+
+BT_FOR_EACH_CPU
+static void put_all(bt_cell *cell, const packing *s, const bt_inv *inv, const double *slop)
 {
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
         bt_batch *o = &cell->work.batch[k];
-        put(o, cell, &p[k], of, inv);
-        if (slop) put_projection(o, cell, of, *slop);
+        put(o, s->u, &s->place[k], s->of, inv);
+        if (slop) put_projection(o, cell, s->of, *slop);
         if (!cell->laws.limits) continue;
         bounds *at = &bounds_of(cell)[k];
         *at = (bounds){0};
         for (int l = 0; l < o->n; l++)
             for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[o->contact[l]].flat[c];
     }
+    bt_contact *rest = rest_of(cell);
+    for (bt_idx i = 0; i < cell->n_contacts; i++)
+        if (!s->listed[i]) copy_records(rest++, &s->u[i], 1);
 }
 
 static void pack(bt_cell *cell, const bt_inv *inv, const double *slop)
 {
     packing s;
-    s.place = cell->work.n_list > FEW ? bt_realloc(NULL, (size_t)cell->work.n_list, sizeof *s.place) : s.few_places;
-    s.of = cell->n_contacts > FEW ? bt_realloc(NULL, (size_t)cell->n_contacts, sizeof *s.of) : s.few_unknowns;
-    take_unknowns(cell, slop != NULL, s.of);
-    make_room(cell, deal(cell, inv, slop != NULL, s.place));
-    put_all(cell, s.place, s.of, inv, slop);
+    begin_packing(&s, cell);
+    put_aside(cell, s.u);
+    take_unknowns(cell, slop != NULL, &s);
+    const bt_idx n_batches = deal(cell, s.u, inv, slop != NULL, s.place);
+    const size_t n_rest = (size_t)(cell->n_contacts - cell->work.n_list);
+    bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + n_rest * sizeof(bt_contact));
+    cell->work.n_batches = n_batches;
+    cell->work.batch = (bt_batch *)cell->contacts;
     cell->work.packed = true;
-    if (s.place != s.few_places) free(s.place);
-    if (s.of != s.few_unknowns) free(s.of);
+    put_all(cell, &s, inv, slop);
+    end_packing(&s);
 }
+
+/// The records of the contacts of a batch.
+BT_INLINE void take_records(const bt_batch *o, bt_contact *u)
+{
+    const bool projection = o->kind == PROJECTION;
+    vec line[4][LANES];
+    int32_t bodies[LANES][2], tail[LANES][2];
+    for (int l = 0; l < LANES; l++) {
+        bodies[l][0] = o->a[l], bodies[l][1] = o->b[l];
+        tail[l][0] = o->points[l], tail[l][1] = o->pair[l];
+    }
+    bt_motions m[4] = {{o->nx, o->ny, o->rat, o->rbt}, {o->ran[0], o->ran[1], o->rbn[0], o->rbn[1]}};
+    m[2] = projection ? (bt_motions){.x = o->KEPT_BIAS_0, .y = o->KEPT_BIAS_1, .w = o->KEPT_MU}
+                      : (bt_motions){.x = o->bias[0], .y = o->bias[1], .w = o->mu};
+    m[3] = projection ? (bt_motions){.x = o->KEPT_LN_0, .y = o->KEPT_LN_1, .w = o->KEPT_LT}
+                      : (bt_motions){.x = o->x[0], .y = o->x[1], .w = o->x[2]};
+    _Static_assert(offsetof(bt_contact, a) == 88 && offsetof(bt_contact, b) == 92, "end of the third line");
+    _Static_assert(offsetof(bt_contact, n) == 120 && offsetof(bt_contact, pair) == 124, "end of the fourth line");
+    memcpy(&m[2].unused, bodies, sizeof bodies);
+    memcpy(&m[3].unused, tail, sizeof tail);
+    for (int k = 0; k < 4; k++) {
+        bt_transpose(&m[k]);
+        line[k][0] = m[k].x, line[k][1] = m[k].y, line[k][2] = m[k].w, line[k][3] = m[k].unused;
+    }
+    for (int l = 0; l < o->n; l++)
+        for (int k = 0; k < 4; k++) memcpy((char *)&u[o->contact[l]] + 32 * k, &line[k][l], sizeof line[k][l]);
+}
+
+static void take_out(const bt_batch *o, bt_unknowns *of)
+{
+    const bool projection = o->kind == PROJECTION;
+    for (int l = 0; l < o->n; l++) {
+        bt_unknowns *to = &of[l];
+        to->contact = o->contact[l];
+        for (int c = 0; c < 2; c++) to->before[c] = o->before[c][l], to->multiplier[c] = o->x[c][l];
+        to->before[2] = projection ? 0 : o->before[2][l];
+    }
+}
+
+/// Returns how many contacts are in batches.
+BT_FOR_EACH_CPU
+static bt_idx take_all(const bt_cell *cell, packing *s)
+{
+    bt_unknowns *of = s->of;
+    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
+        const bt_batch *o = &cell->work.batch[k];
+        take_records(o, s->u);
+        take_out(o, of);
+        of += o->n;
+        for (int l = 0; l < o->n; l++) s->listed[o->contact[l]] = true;
+    }
+    const bt_contact *rest = rest_of(cell);
+    for (bt_idx i = 0; i < cell->n_contacts; i++)
+        if (!s->listed[i]) copy_records(&s->u[i], rest++, 1);
+    return (bt_idx)(of - s->of);
+}
+
+BT_FOR_EACH_CPU
+static void put_back(bt_cell *cell, const bt_contact *u) { copy_records(cell->contacts, u, cell->n_contacts); }
 
 void bt_batch_unpack(bt_cell *cell)
 {
     if (!cell->work.packed) return;
+    packing s;
+    begin_packing(&s, cell);
+    const bt_idx n_last = take_all(cell, &s);
+    const size_t bytes = (size_t)cell->n_contacts * sizeof *s.u, more = (size_t)n_last * sizeof *s.of;
+    bt_cells_make_room(cell, bytes + more);
     cell->work.packed = false;
-    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        const bt_batch *o = &cell->work.batch[k];
-        for (int l = 0; o->kind != PROJECTION && l < o->n; l++) {
-            bt_contact *u = &cell->contacts[o->contact[l]];
-            u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
-        }
-    }
+    cell->work.batch = NULL;
+    cell->work.n_batches = 0;
+    cell->work.last = (bt_unknowns *)((char *)cell->contacts + bytes);
+    cell->work.n_last = n_last;
+    put_back(cell, s.u);
+    memcpy(cell->work.last, s.of, more);
+    end_packing(&s);
 }
 
 // --- residuals -------------------------------------------------------------------------------------------------------
@@ -264,15 +373,16 @@ static void take_last(const bt_cell *cell, bool projection, last_sweep *s)
     s->x = !projection ? NULL : few ? s->few_x : bt_realloc(NULL, n, sizeof *s->x);
     if (n > 0) memset(s->moved, 0, n * sizeof *s->moved);
     if (n > 0 && projection) memset(s->x, 0, n * sizeof *s->x);
-    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        const bt_batch *o = &cell->work.batch[k];
-        for (int l = 0; l < o->n; l++) {
-            const bt_idx i = o->contact[l];
-            const bt_contact *u = &cell->contacts[i];
-            const double x[3] = {projection ? o->x[0][l] : u->ln[0], projection ? o->x[1][l] : u->ln[1],
-                                 projection ? 0 : u->lt};
-            s->moved[i] = x[0] != o->before[0][l] || x[1] != o->before[1][l] || x[2] != o->before[2][l];
-            if (projection) s->x[i][0] = x[0], s->x[i][1] = x[1];
+    for (bt_idx k = 0; k < cell->work.n_last; k++) {
+        const bt_unknowns *o = &cell->work.last[k];
+        const bt_idx i = o->contact;
+        const bt_contact *u = &cell->contacts[i];
+        const double *b = o->before;
+        if (projection) {
+            s->moved[i] = o->multiplier[0] != b[0] || o->multiplier[1] != b[1];
+            s->x[i][0] = o->multiplier[0], s->x[i][1] = o->multiplier[1];
+        } else {
+            s->moved[i] = u->ln[0] != b[0] || u->ln[1] != b[1] || u->lt != b[2];
         }
     }
 }
@@ -461,7 +571,15 @@ typedef bt_motions motion;
 
 BT_INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
 {
+    const uint32_t all = 0x01010101; // of nearly all batches
     bt_transpose(&m);
+    if (memcmp(moves, &all, sizeof all) == 0) {
+        memcpy(&v[body[0]], &m.x, sizeof m.x);
+        memcpy(&v[body[1]], &m.y, sizeof m.y);
+        memcpy(&v[body[2]], &m.w, sizeof m.w);
+        memcpy(&v[body[3]], &m.unused, sizeof m.unused);
+        return;
+    }
     if (moves[0]) memcpy(&v[body[0]], &m.x, sizeof m.x);
     if (moves[1]) memcpy(&v[body[1]], &m.y, sizeof m.y);
     if (moves[2]) memcpy(&v[body[2]], &m.w, sizeof m.w);
@@ -638,12 +756,11 @@ typedef struct {
     vec x[3];
 } moved;
 
-BT_FOR_EACH_CPU
-static void move(bt_batch *batch, bt_idx n, double beta, moved *y)
+BT_INLINE void move_unknowns(bt_batch *batch, bt_idx n, int unknowns, double beta, moved *y)
 {
     for (bt_idx k = 0; k < n; k++) {
         bt_batch *o = &batch[k];
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < unknowns; c++) {
             const vec now = o->x[c];
             if (beta > 0) o->x[c] = now + beta * (now - o->before[c]);
             o->before[c] = now;
@@ -652,15 +769,30 @@ static void move(bt_batch *batch, bt_idx n, double beta, moved *y)
     }
 }
 
-BT_FOR_EACH_CPU
-static double against(const bt_batch *batch, bt_idx n, const moved *y)
+BT_INLINE double sum_against(const bt_batch *batch, bt_idx n, int unknowns, const moved *y)
 {
     vec sum = {0};
     for (bt_idx k = 0; k < n; k++) {
         const bt_batch *o = &batch[k];
-        for (int c = 0; c < 3; c++) sum += (c < 2 ? o->w[c] : o->wt) * (y[k].x[c] - o->x[c]) * (o->x[c] - o->before[c]);
+        for (int c = 0; c < unknowns; c++)
+            sum += (c < 2 ? o->w[c] : o->wt) * (y[k].x[c] - o->x[c]) * (o->x[c] - o->before[c]);
     }
     return sum[0] + sum[1] + sum[2] + sum[3];
+}
+
+BT_FOR_EACH_CPU
+static void move(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 3, beta, y); }
+
+BT_FOR_EACH_CPU
+static double against(const bt_batch *batch, bt_idx n, const moved *y) { return sum_against(batch, n, 3, y); }
+
+BT_FOR_EACH_CPU
+static void move_projection(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 2, beta, y); }
+
+BT_FOR_EACH_CPU
+static double against_projection(const bt_batch *batch, bt_idx n, const moved *y)
+{
+    return sum_against(batch, n, 2, y);
 }
 
 typedef double pass_of_batches(bt_batch *batch, bt_idx n, bt_vel *v);
@@ -672,14 +804,15 @@ static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sw
     const bt_idx n_batches = cell->work.n_batches;
     moved few[FEW / LANES], *y = few;
     if (s->moves && n_batches > FEW / LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
-    if (s->moves) move(batch, n_batches, s->beta, y);
+    const bool projection = once == pass_projection;
+    if (s->moves) (projection ? move_projection : move)(batch, n_batches, s->beta, y);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
         last = once(batch, n_batches, v);
         if (n == 0) *most = last;
         *done += cell->work.n_list;
     }
-    const double turned = s->moves ? against(batch, n_batches, y) : 0;
+    const double turned = !s->moves ? 0 : (projection ? against_projection : against)(batch, n_batches, y);
     if (y != few) free(y);
     return turned;
 }

@@ -19,17 +19,36 @@ static void free_work(bt_work_list *k)
 {
     free(k->list);
     free(k->in_place);
-    free(k->batch);
     k->list = NULL;
     k->in_place = NULL;
-    k->batch = NULL;
-    k->n_list = k->cap_list = k->cap_in_place = k->n_batches = 0;
-    k->batch_bytes = 0;
+    k->n_list = k->cap_list = k->cap_in_place = k->n_last = 0;
+}
+
+void bt_cells_make_room(bt_cell *t, size_t bytes)
+{
+    if (bytes <= t->contact_bytes) return;
+    free(t->contacts);
+    t->contact_bytes = bytes + bytes / 32;
+    t->contacts = bt_alloc_aligned(t->contact_bytes, 1);
+}
+
+/// Only the contacts stay.
+static void rest(bt_cell *t)
+{
+    assert(!t->work.packed);
+    free_work(&t->work);
+    const size_t bytes = (size_t)t->n_contacts * sizeof *t->contacts;
+    if (t->contact_bytes - t->contact_bytes / 8 <= bytes) return;
+    bt_contact *contacts = bt_alloc_aligned(bytes, 1);
+    if (bytes > 0) memcpy(contacts, t->contacts, bytes);
+    free(t->contacts);
+    t->contacts = contacts;
+    t->contact_bytes = bytes;
 }
 
 void bt_cells_rest(bt_cells *t)
 {
-    for (bt_idx k = 0; k < t->n; k++) free_work(&t->cell[k].work);
+    for (bt_idx k = 0; k < t->n; k++) rest(&t->cell[k]);
 }
 
 void bt_cells_idle(bt_cell *t)
@@ -44,6 +63,7 @@ void bt_cells_idle(bt_cell *t)
     t->contacts = NULL;
     t->gaps = NULL;
     t->laws.limits = NULL;
+    t->contact_bytes = 0;
     t->n_contacts = t->cap_contacts = t->laws.cap_limits = 0;
     t->n_points = 0;
     t->overlap = 0;
@@ -430,7 +450,7 @@ static void put_pair(bt_cell *t, bt_idx a, bt_idx b, const bt_memory *r)
     if (s->n_pairs == s->cap_pairs) {
         t->cap_contacts = s->cap_pairs = s->cap_pairs ? 2 * s->cap_pairs : 16;
         s->pairs = bt_realloc(s->pairs, (size_t)s->cap_pairs, sizeof *s->pairs);
-        t->contacts = bt_realloc(t->contacts, (size_t)s->cap_pairs, sizeof *t->contacts);
+        t->contacts = bt_realloc(t->contacts, (size_t)s->cap_pairs, sizeof *t->contacts); // not aligned: no room here
         t->gaps = bt_realloc(t->gaps, (size_t)s->cap_pairs, sizeof *t->gaps);
     }
     const bt_idx at = s->n_pairs++;

@@ -122,10 +122,14 @@ typedef struct bt_work_list {
     /// [n_contacts] of a cell whose contacts are swept where they are, otherwise NULL (solve/rounds.h)
     struct bt_in_place *in_place;
     bt_idx cap_in_place;
-    struct bt_batch *batch;         ///< [n_batches] the contacts that were listed last, again (solve/batch.h)
+    /// The listed contacts are in batches (solve/batch.h), and the cell has no contacts but those. In the memory of the
+    /// contacts: [n_batches], and after them the records of the contacts that are not listed
+    bool packed;
+    struct bt_batch *batch;
     bt_idx n_batches;
-    size_t batch_bytes;
-    bool packed;                    ///< their impulses are there, and not in the contacts
+    /// [n_last] otherwise: what the contacts that were listed last hand on to the next list, after the contacts
+    struct bt_unknowns *last;
+    bt_idx n_last;
     int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
     bool bad;                       ///< some contact is not yet near the tolerance
     bool kept;                      ///< swept in a round over a part of the field
@@ -145,8 +149,9 @@ typedef struct bt_cell {
     bt_pair_search search;
     // contacts of this step
     /// [n_contacts]. After new labels there are none until the next detection: then [n_pairs], with what it takes over,
-    /// which is n, the impulses and the features
+    /// which is n, the impulses and the features. Not while they are packed (work)
     bt_contact *contacts;
+    size_t contact_bytes;           ///< there is room for
     bt_gaps *gaps;                  ///< of the contacts
     bt_idx n_contacts, cap_contacts;
     int64_t n_points;
@@ -232,6 +237,9 @@ void bt_cells_wake_all(bt_cells *t);
 void bt_cells_sort_busy(bt_cells *t);
 /// Leave out of the list what is at rest, idle, and not moved by contacts.
 void bt_cells_leave(bt_cells *t);
+
+/// Room for so many bytes where the contacts are; what was there is lost when there was less.
+void bt_cells_make_room(bt_cell *t, size_t bytes);
 
 /// Give back what sweeps take anew in the next step.
 void bt_cells_rest(bt_cells *t);
