@@ -215,7 +215,7 @@ BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const place *p, cons
         o->pair[l] = u[l]->pair, o->points[l] = (uint8_t)u[l]->n;
         o->moves_a[l] = there && inv[at->a].m > 0, o->moves_b[l] = there && inv[at->b].m > 0;
     }
-    const bt_rows r = bt_rows_of(u);
+    const bt_four_rows r = bt_rows_of(u);
     bt_invs a = bt_take_inv(inv, o->a), b = bt_take_inv(inv, o->b);
     const bt_mask there = (bt_mask){0, 1, 2, 3} < (bt_mask){p->n, p->n, p->n, p->n};
     a.m = bt_only(there, a.m), a.i = bt_only(there, a.i), b.m = bt_only(there, b.m), b.i = bt_only(there, b.i);
@@ -433,7 +433,7 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
         const bt_contact *u[LANES];
         bt_idx at_a[LANES], at_b[LANES];
         four_from(cell, i, u, at_a, at_b);
-        const bt_rows r = bt_rows_of(u);
+        const bt_four_rows r = bt_rows_of(u);
         const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
         const bt_motions a = bt_take_four(v, at_a), b = bt_take_four(v, at_b);
         const bt_limit *k[LANES];
@@ -522,7 +522,7 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
         const bt_contact *u[LANES];
         bt_idx at_a[LANES], at_b[LANES];
         four_from(cell, i, u, at_a, at_b);
-        const bt_rows r = bt_rows_of(u);
+        const bt_four_rows r = bt_rows_of(u);
         const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
         const bt_motions a = bt_take_four(d, at_a), b = bt_take_four(d, at_b);
         const vec un = r.nx * (b.x - a.x) + r.ny * (b.y - a.y);

@@ -16,9 +16,11 @@
 // contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h). The position projection has batches
 // of its own kind, whose unknowns are the multipliers of the points (project.c).
 //
-// Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
-// contacts. What an unknown was before the last sweep, and the multipliers of the projection, stay in the batches until
-// the next list is packed: a contact that is in none was not moved, for otherwise it would have been listed.
+// Packing happens before the first sweep over a new list. Batches take the place of the records, in the memory of the
+// contacts, for both together would be a third of all memory of dense ice; the records of what is not listed stand
+// after them. The records are put back before anybody else looks at the contacts. What an unknown was before the last
+// sweep, and the multipliers of the projection, then stand after the records until the next list is packed: a contact
+// that was in no batch was not moved, for otherwise it would have been listed.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
@@ -52,7 +54,7 @@ double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_swee
 double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
                         double *most);
 
-/// Impulses back into the contacts; nothing when they are there. Multipliers stay in the batches.
+/// The contacts again, with their impulses; nothing when they are there.
 void bt_batch_unpack(bt_cell *cell);
 
 #endif

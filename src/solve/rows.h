@@ -13,10 +13,10 @@
 #include "solve/vector.h"
 
 /// Names as in bt_contact.
-typedef struct bt_rows {
+typedef struct bt_four_rows {
     bt_vec nx, ny, rat, rbt, ran[2], rbn[2], bias[2], mu, ln[2], lt;
     bt_mask one, two; ///< the contact has points (sheets have none); it has two
-} bt_rows;
+} bt_four_rows;
 
 /// Velocities of four bodies, component by component.
 typedef struct bt_motions {
@@ -79,7 +79,7 @@ BT_INLINE bt_motions bt_take_line(const bt_contact *const u[BT_LANES], size_t li
     return m;
 }
 
-BT_INLINE bt_rows bt_rows_of(const bt_contact *const u[BT_LANES])
+BT_INLINE bt_four_rows bt_rows_of(const bt_contact *const u[BT_LANES])
 {
     _Static_assert(offsetof(bt_contact, nx) == 0 && offsetof(bt_contact, rbt) == 24, "first line");
     _Static_assert(offsetof(bt_contact, ran) == 32 && offsetof(bt_contact, rbn) == 48, "second line");
@@ -87,7 +87,7 @@ BT_INLINE bt_rows bt_rows_of(const bt_contact *const u[BT_LANES])
     _Static_assert(offsetof(bt_contact, ln) == 96 && offsetof(bt_contact, lt) == 112, "fourth line");
     const bt_motions p = bt_take_line(u, 0), q = bt_take_line(u, 1), r = bt_take_line(u, 2), s = bt_take_line(u, 3);
     const bt_mask n = {u[0]->n, u[1]->n, u[2]->n, u[3]->n}, none = {0};
-    return (bt_rows){.nx = p.x, .ny = p.y, .rat = p.w, .rbt = p.unused,
+    return (bt_four_rows){.nx = p.x, .ny = p.y, .rat = p.w, .rbt = p.unused,
                      .ran = {q.x, q.y}, .rbn = {q.w, q.unused},
                      .bias = {r.x, r.y}, .mu = r.w,
                      .ln = {s.x, s.y}, .lt = s.w,
@@ -98,7 +98,7 @@ BT_INLINE bt_rows bt_rows_of(const bt_contact *const u[BT_LANES])
 BT_INLINE bt_vec bt_only(bt_mask m, bt_vec x) { return (bt_vec)((bt_mask)x & m); }
 
 /// As bt_mass_of for contacts with points; 0 of others.
-BT_INLINE bt_masses bt_masses_of(const bt_rows *u, bt_invs a, bt_invs b)
+BT_INLINE bt_masses bt_masses_of(const bt_four_rows *u, bt_invs a, bt_invs b)
 {
     const bt_vec free = a.m + b.m, one = {1, 1, 1, 1}, none = {0};
     bt_vec w[2];

@@ -15,7 +15,7 @@
 //   what is bad;
 //   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
 //            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
-//            four a batch, and their impulses put back before the next residual pass (src/solve/batch.h); those of
+//            four a batch, and put back before the next residual pass (src/solve/batch.h); those of
 //            movable large bodies and with rising bounds are swept where they are;
 //   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
 //   settle   at the end: vel anew from vel_free and the impulses, then a residual pass: the residual that is reported.
