@@ -123,10 +123,11 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
     }
     if (own) l->record[BT_LAW_CRUSHING] = (int32_t)(own - t->laws.memory);
     for (int i = 0; i < m->n_points; i++) {
-        l->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
+        l->rise->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
             if (own->feature[j] == m->p[i].feature)
-                l->depth[i] = own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], l->depth[i]) : own->value[j];
+                l->rise->depth[i] =
+                    own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], l->rise->depth[i]) : own->value[j];
     }
 }
 
@@ -144,7 +145,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     // then its edges bear no more than this, and give way as they do when they raft
     const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
-    for (int i = 0; i < m->n_points; i++) g->gap[i] += l->depth[i];
+    for (int i = 0; i < m->n_points; i++) g->gap[i] += l->rise->depth[i];
     const bt_closing c = bt_law_closing(w, t, j, m);
     const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / c.n;
     const double way = bt_max(dt * c.approach - c.gap, LEAST_WAY * w->par.size);
@@ -157,8 +158,8 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
         l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
         if (later <= bt_max(length, least)) continue; // as long as it gets
         const double k = own[BT_CRUSH_PRESSURE] * h * (later - length) / way;
-        l->base[i] = bt_min(l->flat[i], per_length * length);
-        l->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * mass.w[i]));
+        l->rise->base[i] = bt_min(l->flat[i], per_length * length);
+        l->rise->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * mass.w[i]));
     }
 }
 
@@ -168,7 +169,7 @@ static bool gives_way(const bt_contact *u, const bt_limit *l, int i) { return u-
 
 static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 {
-    t->laws.limits[j].depth[i] += t->laws.limits[j].grown[i];
+    t->laws.limits[j].rise->depth[i] += t->laws.limits[j].grown[i];
     bt_sum_add(&number[CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
     bt_sum_add(&number[CRUSHING], 1);
 }
@@ -191,18 +192,18 @@ static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     const bt_idx at = l->record[BT_LAW_CRUSHING];
     if (l->record[BT_LAW_RAFTING] >= 0) return;
     double deepest = 0;
-    for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
+    for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->rise->depth[i]);
     if (deepest == 0) return;
     const uint32_t *feature = t->gaps[j].feature;
     bt_memory r = bt_law_names(w, &t->search.pairs[u->pair], BT_LAW_CRUSHING);
     // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
     for (int i = 0; i < u->n; i++)
-        if (l->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, feature[i], l->depth[i], false);
+        if (l->rise->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, feature[i], l->rise->depth[i], false);
     for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++) {
         const bt_memory *before = &t->laws.memory[at];
         if (before->value[i] > 0) keep_depth(&r, before->feature[i], before->value[i], true);
     }
-    for (int i = 0; i < u->n; i++) keep_depth(&r, feature[i], l->depth[i], false);
+    for (int i = 0; i < u->n; i++) keep_depth(&r, feature[i], l->rise->depth[i], false);
     bt_law_put(t, at, &r);
 }
 

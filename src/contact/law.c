@@ -79,14 +79,18 @@ void bt_laws_reserve(bt_cell *t)
     if (t->n_contacts <= t->laws.cap_limits) return;
     t->laws.cap_limits = bt_cells_room(t->n_contacts);
     free(t->laws.limits);
+    free(t->laws.rises);
     t->laws.limits = bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.limits);
+    t->laws.rises = t->laws.rising ? bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.rises) : NULL;
 }
 
 void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->laws.limits[j];
     *l = (bt_limit){
-        .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}};
+        .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY},
+        .rise = t->laws.rises ? &t->laws.rises[j] : NULL};
+    if (l->rise) *l->rise = (bt_rise){0};
     for (int law = 0; law < BT_ALL_LAWS; law++) l->record[law] = -1;
     if (m->n_points > 0 && w->par.added_laws > 0)
         memcpy(l->closes, bt_law_closing(w, t, j, m).point, sizeof l->closes);

@@ -71,20 +71,26 @@ typedef struct bt_law_total {
 /// A total over a run: whole of BT_TOTAL_STEPS, else real.
 typedef union bt_total_value { double real; int64_t whole; } bt_total_value;
 
+/// The rising part of the bounds of one contact (contact/crush.h).
+typedef struct bt_rise {
+    double base[2];  ///< never above flat, N s
+    double slope[2]; ///< kg
+    double depth[2]; ///< crushed so far, m
+} bt_rise;
+
 /// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach; flat[0] of sheets: the radius of their disc, N s
-    double base[2];  ///< of the rising part; never above flat, N s
-    double slope[2]; ///< of the rising part, kg
     double most[2];  ///< N s
     double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
     double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
-    double depth[2]; ///< crushed so far, m (contact/crush.h)
     double grown[2]; ///< by how much the bodies go into each other in this step, m
-    int32_t by[2];   ///< the law that set cap
+    bt_rise *rise;   ///< NULL where no law has a rising bound
     int32_t record[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
+    uint8_t by[2];   ///< the law that set cap
     bool closes[2];  ///< bt_closing by the outlines, for laws that are added
 } bt_limit;
+_Static_assert(sizeof(bt_limit) == 120, "one for each contact of ice that rafts");
 
 /// Mean floe sizes by which two bodies may have parted and still remember each other; cells always reach that far.
 #define BT_LAW_MEMORY 0.1
@@ -215,7 +221,7 @@ static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int la
 /// A flat bound c of this law on point i, whatever bounds it now, N s.
 static inline void bt_law_narrow(bt_limit *l, int i, double c, int law)
 {
-    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = law;
+    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = (uint8_t)law;
     l->flat[i] = bt_min(l->flat[i], c);
     l->most[i] = bt_min(l->most[i], c);
 }

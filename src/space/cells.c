@@ -58,11 +58,13 @@ void bt_cells_idle(bt_cell *t)
     free(t->contacts);
     free(t->gaps);
     free(t->laws.limits);
+    free(t->laws.rises);
     free_work(&t->work);
     t->search = (bt_pair_search){0};
     t->contacts = NULL;
     t->gaps = NULL;
     t->laws.limits = NULL;
+    t->laws.rises = NULL;
     t->contact_bytes = 0;
     t->n_contacts = t->cap_contacts = t->laws.cap_limits = 0;
     t->n_points = 0;

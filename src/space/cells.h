@@ -108,6 +108,7 @@ typedef struct bt_pair_search {
 /// What contact laws bound and remember in a cell (contact/law.h).
 typedef struct bt_law_state {
     struct bt_limit *limits;        ///< [n_contacts] bounds of the contacts; NULL where contacts are rigid
+    struct bt_rise *rises;          ///< [n_contacts] their rising parts; NULL where no law has one
     /// [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
     bt_memory *memory;
     bt_idx cap_limits, n_memory, cap_memory;

@@ -558,7 +558,7 @@ static void laws_of_a_jam(void **state)
                 const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
                 for (int i = 0; i < t->contacts[j].n; i++) {
                     assert_true(l->grown[i] >= 0);
-                    if (rafts) assert_true(l->depth[i] <= l->grown[i]);
+                    if (rafts) assert_true(l->rise->depth[i] <= l->grown[i]);
                     crushed += l->grown[i] > 0, rafted += rafts;
                 }
             }

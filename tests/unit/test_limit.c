@@ -34,14 +34,15 @@ static void the_law_of_one_manifold(void **state)
         const int n = 1 + (k & 1);
         bt_contact u = random_contact(&rng, n);
         const bt_mass m = bt_mass_of(&u, inv);
-        bt_limit l = {.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
+        bt_rise rise = {0};
+        bt_limit l = {.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .rise = &rise};
         for (int i = 0; i < n; i++) {
             if (scene_uniform(&rng) < 0.2) continue; // no ice
             l.flat[i] = l.most[i] = 0.5 * scene_uniform(&rng);
             l.place[i] = bt_max(u.bias[i], 0);
             if (scene_uniform(&rng) < 0.4) continue;
-            l.base[i] = l.flat[i] * bt_min(1, 1.5 * scene_uniform(&rng));
-            l.slope[i] = exp(4 * scene_uniform(&rng) - 2);
+            rise.base[i] = l.flat[i] * bt_min(1, 1.5 * scene_uniform(&rng));
+            rise.slope[i] = exp(4 * scene_uniform(&rng) - 2);
             l.most[i] += scene_uniform(&rng);
         }
         bt_vel v[2];
@@ -49,7 +50,7 @@ static void the_law_of_one_manifold(void **state)
             v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
         const double start[2] = {scene_uniform(&rng), n > 1 ? scene_uniform(&rng) : 0};
         for (int i = 0; i < n; i++) u.ln[i] = start[i];
-        const bool flat = l.slope[0] == 0 && l.slope[1] == 0;
+        const bool flat = rise.slope[0] == 0 && rise.slope[1] == 0;
         for (int turn = 0; turn < (n == 1 || flat ? 1 : 300); turn++) bt_update_contact(&u, &m, &l, v, inv);
         double sum = 0;
         // turns converge by w12²/(w1 w2) each
@@ -59,7 +60,8 @@ static void the_law_of_one_manifold(void **state)
         for (int i = 0; i < n; i++) {
             const double w = bt_normal_velocity(&u, i, &v[0], &v[1]) + u.bias[i],
                          approach = bt_max(0, -(w - u.bias[i] + l.place[i]));
-            const double limit = bt_min(l.most[i], bt_max(l.flat[i], l.base[i] + l.slope[i] * approach)), tol = 1e-7;
+            const double limit = bt_min(l.most[i], bt_max(l.flat[i], rise.base[i] + rise.slope[i] * approach)),
+                         tol = 1e-7;
             assert_true(u.ln[i] >= 0 && u.ln[i] <= limit + tol);
             if (u.ln[i] > tol) assert_true(w <= tol);
             if (u.ln[i] < limit - tol) assert_true(w >= -tol);
