@@ -414,6 +414,16 @@ BT_INLINE void four_from(const bt_cell *cell, bt_idx i, const bt_contact *u[LANE
     }
 }
 
+/// Lanes of contacts i to i + 3 that there are.
+BT_INLINE mask there_are(const bt_cell *cell, bt_idx i)
+{
+    const int64_t left = cell->n_contacts - i;
+    return (mask){0, 1, 2, 3} < (mask){left, left, left, left};
+}
+
+BT_INLINE double largest_lane(vec a) { return bt_max(bt_max(a[0], a[1]), bt_max(a[2], a[3])); }
+BT_INLINE int64_t sum_of(mask a) { return a[0] + a[1] + a[2] + a[3]; }
+
 BT_INLINE vec limits_of(const bt_limit *const k[LANES], int c)
 {
     // of `most` and `flat` the lower one: nothing rises here
@@ -429,6 +439,8 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
     const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
     const bt_limit *limits = cell->laws.limits;
     bt_found f = {0};
+    vec most = zero;
+    mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += LANES) {
         const bt_contact *u[LANES];
         bt_idx at_a[LANES], at_b[LANES];
@@ -461,28 +473,32 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
         const vec e = (bt_larger(-bound, bt_smaller(bound, r.lt - wt * m.mt)) - r.lt) * m.wt;
         square[2] = e * e;
         worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
-        const lanes most = lanes_of(worst), normal = lanes_of(square[0]), second = lanes_of(square[1]),
-                    tangent = lanes_of(square[2]);
+        const mask counts = there_are(cell, i) & (bounded ? r.one : ~(mask){0}); // sheets one by one
+        most = bt_larger(most, bt_only(counts, worst));
+        bad -= counts & (worst > near);
+        rows += counts & (1 - r.one - r.two);
+        const lanes normal = lanes_of(square[0]), second = lanes_of(square[1]), tangent = lanes_of(square[2]);
         for (int l = 0; l < LANES && i + l < cell->n_contacts; l++) {
-            double largest = most.of[l];
             bool listed = p->plain || on[l] || moved[i + l];
             if (bounded && u[l]->n == 0) {
                 const bt_mass own = bt_mass_of(u[l], inv);
-                largest = bt_sheets_residual(u[l], &own, k[l], v, &f.squares);
+                const double largest = bt_sheets_residual(u[l], &own, k[l], v, &f.squares);
                 listed = p->plain || u[l]->ln[0] + u[l]->ln[1] > 0 || u[l]->lt != 0 || moved[i + l] || largest > 0;
-                f.rows++;
+                f.most = bt_max(f.most, largest);
+                f.bad += largest > near;
+                f.rows += 2;
             } else {
                 f.squares += normal.of[l];
                 f.squares += second.of[l];
                 f.squares += tangent.of[l];
             }
-            f.most = bt_max(f.most, largest);
-            f.bad += largest > near;
-            f.rows += u[l]->n + 1;
             cell->work.list[cell->work.n_list] = i + l;
             cell->work.n_list += listed;
         }
     }
+    f.most = bt_max(f.most, largest_lane(most));
+    f.bad += sum_of(bad);
+    f.rows += sum_of(rows);
     return f;
 }
 
@@ -518,6 +534,8 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
     const double near = BT_NEAR * p->tolerance;
     const vec zero = {0};
     bt_found f = {0};
+    vec most = zero;
+    mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += LANES) {
         const bt_contact *u[LANES];
         bt_idx at_a[LANES], at_b[LANES];
@@ -541,17 +559,21 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
             square[c] = e * e;
             on |= there & ((x > zero) | ~(open >= zero));
         }
-        const lanes most = lanes_of(worst), first = lanes_of(square[0]), second = lanes_of(square[1]);
+        const mask counts = there_are(cell, i);
+        most = bt_larger(most, bt_only(counts, worst));
+        bad -= counts & (worst > near);
+        rows += counts & (-r.one - r.two);
+        const lanes first = lanes_of(square[0]), second = lanes_of(square[1]);
         for (int l = 0; l < LANES && i + l < cell->n_contacts; l++) {
             f.squares += first.of[l];
             f.squares += second.of[l];
-            f.most = bt_max(f.most, most.of[l]);
-            f.bad += most.of[l] > near;
-            f.rows += u[l]->n;
             cell->work.list[cell->work.n_list] = i + l;
             cell->work.n_list += on[l] || s->moved[i + l];
         }
     }
+    f.most = bt_max(f.most, largest_lane(most));
+    f.bad += sum_of(bad);
+    f.rows += sum_of(rows);
     return f;
 }
 
@@ -719,8 +741,6 @@ BT_INLINE vec project(bt_batch *o, bt_vel *d)
     store(d, o->b, o->moves_b, b);
     return most;
 }
-
-BT_INLINE double largest_lane(vec a) { return bt_max(bt_max(a[0], a[1]), bt_max(a[2], a[3])); }
 
 BT_FOR_EACH_CPU
 static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
