@@ -29,7 +29,7 @@ from pathlib import Path
 import command
 import findings
 import stat_mean
-from bergtow_read import Run, RunError, within
+from bergtow_read import LIMIT, USAGE, Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 
 import numpy as np
@@ -69,7 +69,7 @@ def longer(run, k):
     length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.headings[:, 0]
     if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
         raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
-                       "take the width, or leave the length out of --vary")
+                       "take the width, or leave the length out of --vary", USAGE)
     more = length * (1.5 ** k - 1)
     out = {"domain.length": length + more, "domain.x0": run.value("domain.x0") - (more if along[0] < 0 else 0.0),
            "body.x": run.value("body.x")}
@@ -256,7 +256,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
-                       "raise --budget; what was begun is kept, and the same call goes on")
+                       "raise --budget; what was begun is kept, and the same call goes on", LIMIT)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         rows += window(study, margin)

@@ -164,6 +164,8 @@ def test_what_is_refused(tmp_path):
                           capture_output=True, text=True)
     assert lost.returncode == 4 and "name the folder that holds postproc/ in BERGTOW_HOME" in lost.stderr
     assert bad.returncode == 3 and "unknown key" in bad.stderr and "Traceback" not in bad.stderr
+    short = said("case.yml", "--budget", 1e-4, "-o", "short")
+    assert short.returncode == 6 and "raise --budget" in short.stderr
     assert not (tmp_path / "out").exists()
     device = said("/dev/null", "-o", "out")
     assert device.returncode == 4 and "is a device" in device.stderr and "no such file" not in device.stderr
