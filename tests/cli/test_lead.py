@@ -79,6 +79,20 @@ def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     assert again.hash == made.hash
 
 
+def test_a_field_says_that_its_lead_is_not_in_it(tmp_path):
+    """A map of the ice of a case with a lead shows none; and its floes, none of which is a piece, are held against the
+    size law as without a lead. Red when nothing is said."""
+    sizes = dict(ice__size_law="power", ice__size_min=0.2, ice__size_max=5, ice__size=None, ice__size_spread=None,
+                 ice__concentration=0.8)
+    write_case(tmp_path, changed(BASE, lead=MANAGED, run__duration=2, **sizes))
+    said = call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").stdout
+    assert "warning: lead.mode: managed: the file holds the ice as it is before the lead" in said
+    write_case(tmp_path, changed(BASE, run__duration=2, **sizes))
+    without = call("field", tmp_path / "case.yml", "-o", tmp_path / "g.h5").stdout
+    below = [line for line in without.splitlines() if "smaller than ice.size_min" in line]
+    assert below and below[0] in said and "lead" not in without
+
+
 def test_a_lead_beyond_the_front_of_a_moving_window_goes_round_it(tmp_path):
     """Ice that enters is as it was made: two laps in a channel, where the mother field behind the body had none."""
     case = changed(BASE,
