@@ -65,6 +65,19 @@ def test_a_managed_lead_keeps_the_mass(tmp_path):
     assert r.summary["momentum_residual"] < 1e-10
 
 
+def test_a_tow_in_a_channel_is_held_against_no_estimate(tmp_path):
+    """They are of the ice as it was before its floes were removed. Red when the ratio is that of open water to them;
+    pieces keep mass and concentration, and a ratio."""
+    case = changed(BASE, lead=MANAGED, ice__thickness_law=None, run__duration=15, output__window_start=5)
+    cut = run(tmp_path, case, name="cut")
+    channel = run(tmp_path, changed(case, lead=changed(CHANNEL, length=2)), name="channel")
+    momentum = [r.summary["estimates"]["marchenko_momentum"] for r in (cut, channel)]
+    assert momentum[0]["force_n"] == pytest.approx(momentum[1]["force_n"], rel=0.05) and momentum[1]["valid"]
+    assert [e["compares"] for e in momentum] == [True, False]
+    assert momentum[0]["simulated_over_estimate"] > 0 and "none knows the channel" in channel.result.stdout
+    assert "none knows the channel" not in cut.result.stdout
+
+
 def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     """`bergtow field` writes the ice as it was before the lead, since the case that reads it opens the lead."""
     case = changed(BASE, lead=MANAGED, run__duration=2)
