@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import case_runs  # noqa: E402
 import converge  # noqa: E402
 import converge_text  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow_read import Run, RunError  # noqa: E402
 
 
 @pytest.mark.parametrize("n", [4, 8, 32])
@@ -320,7 +320,7 @@ def test_fields_that_are_the_same_run_are_refused(tmp_path):
 class Towed:
     """The case of a tow of this heading from 240 m in a domain of 300 m."""
 
-    path, case = "towed", {"domain.ends": "walls"}
+    path, case, case_text = "towed", {"domain.ends": "walls"}, ""
     value = {"domain.length": 300.0, "domain.ahead": np.nan, "domain.x0": 0.0, "body.x": 240.0}.get
 
     def __init__(self, *headings):
@@ -334,3 +334,18 @@ def test_the_length_grows_ahead_of_the_body():
     for headings in ((90,), (0, 90), (0, 180)):
         with pytest.raises(RunError, match="does not go along the domain"):
             converge.longer(Towed(*headings), 1)
+
+
+def test_an_ice_region_that_reaches_the_ends_of_the_domain_goes_with_them(tmp_path):
+    """Red when it stays: the pack is the same with open water beside it, "no effect" of a length that no ice fills and
+    a large one of a width."""
+    case = changed(CASE, ice__x_min=1, ice__x_max=20, ice__y_min=-3, run__duration=4, output__window_start=2)
+    width = case["domain"]["width"]
+    run(tmp_path, case, "--set", f"ice.y_max={width / 2}", name="given")
+    with Run(tmp_path / "given") as there:
+        assert converge.longer(there, 1) == {"domain.length": 30, "domain.x0": 0, "body.x": 3, "ice.x_max": 30}
+        # of two sides the one that the ice reaches; the other has open water of its own
+        assert converge.wider(there, 1) == {"domain.width": 2 * width, "domain.y0": -width, "ice.y_max": width}
+    run(tmp_path, changed(CASE, run__duration=4, output__window_start=2), name="own")
+    with Run(tmp_path / "own") as there:  # what the case does not give follows the domain by itself
+        assert set(converge.wider(there, 1)) == {"domain.width", "domain.y0"}
