@@ -181,6 +181,10 @@ def vary(study, kind, margin, most=TRIES):
         tries = [{}] + [kind.values(run, k + 1) for k in range(most)]
         first, unit = run.value(kind.key), run.case.get(kind.key, "").partition(" ")[2]
         walls = kind.name == "width" and run.case.get("domain.sides") == "wall"
+        programme = run.case.get("tow.programme", "none") != "none"
+    if kind.name == "start" and programme:  # which stands in place of the ramp
+        return [{"name": kind.name, "key": kind.key, "judged": "open",
+                 "why": "the start is that of tow.programme; make its first rows slower by hand"}]
     if not np.isfinite(first) or (first <= 0 and kind.name != "start"):
         return [{"name": kind.name, "key": kind.key, "judged": "open", "why": f"the case has no {kind.key}"}]
     names, rows = ["case"] + [f"{kind.name}-{k + 1}" for k in range(most)], []

@@ -114,6 +114,13 @@ def test_a_start_without_a_ramp_is_held_against_one_of_the_own_size(tmp_path):
     assert row["judged"] == "matters" and row["recommended"] == pytest.approx(2 / 0.13, rel=0.2)
 
 
+def test_a_programme_has_a_start_of_its_own(tmp_path):
+    """Red: the ramp was varied, the program refused it beside a programme, and the call ended as one that failed."""
+    case = changed(LINE, tow__speed=None, tow__ramp=None, tow__programme=[[0, 0], [20, 0.13]])
+    found, text = converged(tmp_path, case, "--vary", "start", "--budget", 3)
+    assert [row["judged"] for row in found["rows"]] == ["open"] and "that of tow.programme" in text
+
+
 @pytest.mark.slow
 def test_a_ramp_ends_before_the_window(tmp_path):
     """Four times 10 s would end behind the beginning of the window at 30 s; and from 24 s on nothing is left to try."""
@@ -313,7 +320,7 @@ def test_fields_that_are_the_same_run_are_refused(tmp_path):
     settled(runs, 0, state_hash="b")
     assert runs.make("case", [0, 1], {}) == [None, None]
     settled(runs, 1, state_hash="b")
-    with pytest.raises(RunError, match="the ice is read, and no seed changes it"):
+    with pytest.raises(RunError, match="the ice is read.*no seed changes it"):
         runs.make("case", [0, 1], {})
 
 
