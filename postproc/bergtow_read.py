@@ -31,6 +31,10 @@ def within(time, start, end):
     return there
 
 
+#: exit codes besides 4, input or output: of what was asked for, of the case, of a limit of time
+USAGE, BAD_CASE, LIMIT = 2, 3, 6
+
+
 class RunError(Exception):
     """A run folder or one of its files cannot be used. str() reads "path: reason; remedy". code: the exit code of a
     script that ends with it."""

@@ -18,7 +18,7 @@ import findings
 import loads
 import stat_budget
 import stat_load
-from bergtow_read import RunError
+from bergtow_read import BAD_CASE, LIMIT, USAGE, RunError
 from case_runs import program, run_members
 from ensemble_read import FAILED, FINISHED, WAITING, Ensemble, listed
 from text_table import hours_text
@@ -71,7 +71,7 @@ def numbers(e, of):
     if load := re.fullmatch(r"(\w+):(\d+(?:\.\d+)?)", of):
         share = float(load[2])
         if not 0 < share <= 100:
-            raise RunError(of, "a quantile lies above 0 and at most at 100 %", "write it as tow_force:99")
+            raise RunError(of, "a quantile lies above 0 and at most at 100 %", "write it as tow_force:99", USAGE)
         meaning, values = quantile(e, e.used, load[1], share)
         if meaning is None:
             raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
@@ -80,7 +80,8 @@ def numbers(e, of):
         whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # what comes after a tow is in it
         meaning, values = e.meaning.get(of, {}), (e.mean if of == OF[0] else whole)[e.used]
     else:
-        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE")
+        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE",
+                       USAGE)
     there = np.isfinite(values)
     return meaning, e.used[there], values[there]
 
@@ -132,9 +133,11 @@ def of_ensemble(e, of=OF[0], computed=None):
     members of the sample failed, or have no such number, nobody knows which values are missing, and there are no
     intervals. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
-        raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study")
+        raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
+                       BAD_CASE)
     if "fields: common" in e.study:
-        raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own")
+        raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
+                       BAD_CASE)
     meaning, done, values = numbers(e, of)
     sample = fair(e)
     there = np.isin(done, sample)
@@ -143,7 +146,8 @@ def of_ensemble(e, of=OF[0], computed=None):
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
                                computed if of == OF[0] else None)
     if "refused" in found:
-        raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
+        raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further",
+                       LIMIT)
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
     if lacking or np.any(e.status[sample] == FAILED):
         found = without_intervals(found)

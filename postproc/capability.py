@@ -28,7 +28,7 @@ import domain_width
 import findings
 import stat_mean
 import units
-from bergtow_read import Run, RunError, case_value, parse_case, within
+from bergtow_read import BAD_CASE, USAGE, Run, RunError, case_value, parse_case, within
 from case_file import files, section
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 
@@ -79,9 +79,10 @@ def kept(run, least):
 def trial(run, number, least):
     """Of a run that is there. Errors: RunError."""
     if run.window is None:
-        raise RunError(run.path, "the run has no window", "make run.duration longer")
+        raise RunError(run.path, "the run has no window", "make run.duration longer", BAD_CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
-        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
+        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
+                       BAD_CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
     # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted
@@ -253,7 +254,7 @@ def with_number(binary, case, sets, key, text):
     found = resolved(binary, case, [*sets, f"{key}={text}"])
     value = case_value(found, key)
     if not np.isfinite(value):
-        raise RunError(case, f"{key}={text} is no number", "search a key that is a number")
+        raise RunError(case, f"{key}={text} is no number", "search a key that is a number", USAGE)
     return found, value
 
 
@@ -266,7 +267,7 @@ def conditions(a, binary, given, start, end, resolution):
     key, _, texts = a.conditions.partition("=")
     texts = [t.strip() for t in texts.split(",") if t.strip()]
     if not texts:
-        raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"')
+        raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"', USAGE)
     out = []
     for k, text in enumerate(texts):
         case = resolved(binary, a.case, [*given, f"{key}={text}"])
@@ -280,13 +281,13 @@ def check(case, key):
     if mode != "thrust" and not (mode == "line" and load > 0):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
-                       "tow.line.breaking_load")
+                       "tow.line.breaking_load", BAD_CASE)
     if domain_width.read_ice_of(case):
         raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
                        "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
-                       "each value")
+                       "each value", BAD_CASE)
     if key == "ice.seed":
-        raise RunError(key, "the fields are its values already", "search another key")
+        raise RunError(key, "the fields are its values already", "search another key", USAGE)
 
 
 def share(text):
@@ -342,18 +343,18 @@ def main(argv=None):
     ends = [with_number(binary, a.case, a.set, a.search, text) for text in (a.start, a.end)]
     start, end = (value for _, value in ends)
     if start == end:
-        raise RunError(a.search, "the range has no extent", "give --from and --to two values")
+        raise RunError(a.search, "the range has no extent", "give --from and --to two values", USAGE)
     unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
     resolution = abs(end - start) / PARTS
     if a.resolution:
         resolution = units.number(binary, "--resolution", a.resolution, unit)
         if not 0 < resolution <= abs(end - start):
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
-                           f"give a part of {abs(end - start):.4g} {unit}".rstrip())
+                           f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
     if a.speed:
         least = units.number(binary, "--speed", a.speed, "m/s")
         if not least > 0:
-            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep")
+            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep", USAGE)
     last = began + 60 * a.budget
     runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]

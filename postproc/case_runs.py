@@ -27,7 +27,7 @@ from pathlib import Path
 
 from bergtow._calls import Calls
 from bergtow._interrupts import held
-from bergtow_read import Refused, Run, RunError
+from bergtow_read import BAD_CASE, USAGE, Refused, Run, RunError
 from case_file import files
 
 import numpy as np
@@ -112,7 +112,8 @@ class CaseRuns:
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
-            raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out")
+            raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out",
+                           USAGE)
         version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
         try:
             layers = files(self.case)
@@ -219,8 +220,9 @@ class CaseRuns:
                 sorted((self.folder / self.subject / name).glob("f*/summary.json"))[:2]]
         first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
         if first is not None and first == second:
-            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read, and "
-                           "no seed changes it", "let the program make the ice, by removing ice.outlines or ice.field")
+            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or given "
+                           "floe by floe, and no seed changes it", "let the program make the ice, by removing "
+                           "ice.outlines, ice.field or floes", BAD_CASE)
 
     def there(self, name, n, values):
         """Are n runs there now, or could they be made? False where the budget does not reach so far."""

@@ -29,8 +29,9 @@ from pathlib import Path
 import command
 import findings
 import stat_mean
-from bergtow_read import Run, RunError, within
+from bergtow_read import LIMIT, USAGE, Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
+from report_case import BESIDE, annotated
 
 import numpy as np
 import scipy
@@ -63,25 +64,37 @@ def slower_start(run, k):
     return {"tow.ramp": max(first, min(ramp, LATEST * run.window[0])) if run.window else ramp}
 
 
+def ice_to(run, moved):
+    """Ends of the ice region that the case gives where the domain ends, which go with it: {key: value}. Left where they
+    are, the pack would be the same with open water beside it, and no ice would be wider or longer. One that ends before
+    the domain does has an extent of its own. moved: {key of such an end: (where the domain ends, where it is to end)}.
+    """
+    said = annotated(run.case_text)
+    return {key: to for key, (end, to) in moved.items() if {key, f"{BESIDE}{key}"} & set(said)
+            and np.isclose(run.value(key), end, rtol=0, atol=1e-9 * run.value("domain.length"))}
+
+
 def longer(run, k):
     """Half the length more ahead of the body; the end behind it stays where it is. Errors: RunError for a tow that does
     not go along the domain."""
     length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.headings[:, 0]
     if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
         raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
-                       "take the width, or leave the length out of --vary")
-    more = length * (1.5 ** k - 1)
-    out = {"domain.length": length + more, "domain.x0": run.value("domain.x0") - (more if along[0] < 0 else 0.0),
+                       "take the width, or leave the length out of --vary", USAGE)
+    more, x0 = length * (1.5 ** k - 1), run.value("domain.x0")
+    out = {"domain.length": length + more, "domain.x0": x0 - (more if along[0] < 0 else 0.0),
            "body.x": run.value("body.x")}
     if run.case.get("domain.ends") == "moving" and np.isfinite(ahead):
         out["domain.ahead"] = ahead + more
-    return out
+    return out | ice_to(run, {"ice.x_min": (x0, x0 - more)} if along[0] < 0 else
+                        {"ice.x_max": (x0 + length, x0 + length + more)})
 
 
 def wider(run, k):
-    width = run.value("domain.width") * 2.0 ** k
-    centre = run.value("domain.y0") + run.value("domain.width") / 2
-    return {"domain.width": width, "domain.y0": centre - width / 2}
+    before, y0 = run.value("domain.width"), run.value("domain.y0")
+    width, centre = before * 2.0 ** k, y0 + before / 2
+    return {"domain.width": width, "domain.y0": centre - width / 2} | ice_to(
+        run, {"ice.y_min": (y0, centre - width / 2), "ice.y_max": (y0 + before, centre + width / 2)})
 
 
 def mean_resistance(run):
@@ -168,6 +181,10 @@ def vary(study, kind, margin, most=TRIES):
         tries = [{}] + [kind.values(run, k + 1) for k in range(most)]
         first, unit = run.value(kind.key), run.case.get(kind.key, "").partition(" ")[2]
         walls = kind.name == "width" and run.case.get("domain.sides") == "wall"
+        programme = run.case.get("tow.programme", "none") != "none"
+    if kind.name == "start" and programme:  # which stands in place of the ramp
+        return [{"name": kind.name, "key": kind.key, "judged": "open",
+                 "why": "the start is that of tow.programme; make its first rows slower by hand"}]
     if not np.isfinite(first) or (first <= 0 and kind.name != "start"):
         return [{"name": kind.name, "key": kind.key, "judged": "open", "why": f"the case has no {kind.key}"}]
     names, rows = ["case"] + [f"{kind.name}-{k + 1}" for k in range(most)], []
@@ -256,7 +273,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
-                       "raise --budget; what was begun is kept, and the same call goes on")
+                       "raise --budget; what was begun is kept, and the same call goes on", LIMIT)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         rows += window(study, margin)

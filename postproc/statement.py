@@ -17,7 +17,8 @@ import stat_load
 import stat_mean
 import stat_profile
 from bergtow_read import Run, RunError
-from report_case import source_of_ice
+from ensemble_read import short_key
+from report_case import short as in_short, source_of_ice
 from text_table import hours_text, quantity, short
 
 LOCKS = 60          # body widths that ice asks for which locks as the body displaces it (src/case/arch.c)
@@ -36,7 +37,7 @@ HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body
              ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
              ("tow.speed", "", ""), ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
 TOWED = {"speed": " prescribed", "line": " of the towing end of the line", "thrust": " asked of the vessel"}
-#: what moves water and air: words where all keys are at zero
+#: what moves water and air: words where all keys are at zero, and these keys
 STILL = {"no current": ("water.current_x", "water.current_y", "water.tide.major", "water.current_table"),
          "no wind": ("air.wind_x", "air.wind_y", "air.wind_table")}
 
@@ -354,6 +355,33 @@ def statement(e, rows, c):
     }
 
 
+def _moved(e, case):
+    """What moves water and air, in words: "no current", or what the case says of it, where the study does not vary it.
+    A value without its current holds for another speed through the water than that of the tow."""
+    for words, keys in STILL.items():
+        there = [key for key in keys if case.texts.get(key, "none").split(" ")[0] not in ("0", "none")]
+        if there:
+            for key in (key for key in there if key not in e.parameters):
+                text = case.texts[key]
+                yield f"{short_key(key).replace('.', ' ')} " + (
+                    text.rpartition("/")[2] if key.endswith("table") else in_short(text))
+        elif not any(key in e.parameters for key in keys):
+            yield words
+
+
+def _lead(e, case):
+    """The lead ahead of the body in words, none where the study varies whether there is one: ice that was removed or
+    cut is not that of the floes named here."""
+    mode, size = case.texts.get("lead.mode", "none"), case.texts.get("lead.floe_size", "")
+    if mode == "none" or "lead.mode" in e.parameters:
+        return []
+    sides = [f"{in_short(case.texts[key])} {word}" for key, word in (("lead.width", "wide"), ("lead.length", "long"))
+             if key in case.texts and key not in e.parameters]
+    pieces = "without floes" if mode == "channel" else "of pieces" if "lead.floe_size" in e.parameters else \
+        f"of pieces up to {in_short(size)}"
+    return [" ".join(["a lead", *" and ".join(sides).split(), pieces])]
+
+
 def _holds_for(e, case):
     """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
     if case is None:
@@ -361,7 +389,5 @@ def _holds_for(e, case):
     said = [(case.texts[key], before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
             for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters
             and (key != "body.length" or case.texts.get("body.shape") != "polygon")]
-    still = [words for words, keys in STILL.items() if not any(key in e.parameters for key in keys)
-             and all(case.texts.get(key, "none").split(" ")[0] in ("0", "none") for key in keys)]
     return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)
-                      for value, before, behind in said] + still)
+                      for value, before, behind in said] + _lead(e, case) + list(_moved(e, case)))

@@ -14,7 +14,7 @@ MADE = "cli/test_made_good.py::test_"
 PUT = "cli/test_python_stepping.py::test_"
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
-PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
+PROJECT = ["physics/test_contact_law", "physics/test_impacts", "physics/test_rafting", "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 COPIES = "parallel/test_copies.py::test_ranks_hold_what_they_need"
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
@@ -200,8 +200,14 @@ MUTANTS = {
         ("s->shifted = t.most > w->par.slop;", "s->shifted = t.most > 2 * w->par.slop;", "no shift below two slops"),
         (".tolerance = 0.1 * w->par.slop", ".tolerance = w->par.slop", "projection ends early"),
         (".length = 25", ".length = 5", "rounds of another length"),
-        ("st->projected = work.residual <= p.tolerance;", "", "what is left of overlap is not reported"),
-        ("bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);", "", "ghosts are not shifted"),
+        ("st->projected = st->projected && work.residual <= p.tolerance;", "", "what is left of overlap is not reported"),
+        ("bt_domain_settle(w, s->shift);", "", "ghosts are not shifted"),
+        ("if (!s->turned) return false;", "return false;", "floes that turn stay inside a hull"),
+        ("    s->n_kept = 0;\n", "", "contacts of an earlier step come back"),
+        ("w->cells->cell[q->cell].contacts[q->at] = q->was;", "(void)q;", "rows of the second projection stay"),
+        ("if (l->record[law] >= 0) return false;", ";", "rafted floes are pushed apart"),
+        ("if (*(const bool *)shifted) g->gap[i] +=", "if (*(const bool *)shifted) g->gap[i] -=",
+         "the second projection sees the first backwards"),
     ]),
     "src/solve/solver.c": (SOLVE + ["physics/test_tow", "unit/test_cells", "scenes:line,solver_settings,cold_start"], [
         ("#define UPDATES 6.0", "#define UPDATES 2.0", "steps end before they are solved"),

@@ -140,15 +140,21 @@ def two_sizes(path, length, width, concentration, seed):
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}), encoding="utf-8")
 
 
-def study(a, part):
-    """Rows of a part: its labels with the results of its fields."""
-    todo = jobs(part, a.fields)
+def prepared(out, part, fields):
+    """jobs(), with the ice that is read in files of the folder out."""
+    todo = jobs(part, fields)
     for _, name, values in todo:
         if "ice__outlines" in values:
-            path = (a.out / part / f"{name}.geojson").resolve()
+            path = (out / part / f"{name}.geojson").resolve()
             two_sizes(path, *(float(values[f"domain__{key}"].split()[0]) for key in ("length", "width")),
-                      values["ice__concentration"], values["ice__seed"])
+                      values.pop("ice__concentration"), values["ice__seed"])
             values.update(ice__outlines=path, ice__outlines_crs="frame")
+    return todo
+
+
+def study(a, part):
+    """Rows of a part: its labels with the results of its fields."""
+    todo = prepared(a.out, part, a.fields)
     results = every(a, [(f"{part}/{name}", values) for _, name, values in todo], flow)
     rows = {}
     for (labels, _, _), result in zip(todo, results):

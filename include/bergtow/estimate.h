@@ -41,7 +41,8 @@
 // at hand.
 //
 // A run is held against estimates that know the concentration, within their range: a ratio to one that does not, or
-// beyond its range, would tell of the estimate and not of the run (bt_estimate.compares).
+// beyond its range, would tell of the estimate and not of the run (bt_estimate.compares). So would one of a run in a
+// channel: A is that of the ice before its floes were removed, which the body does not meet.
 #ifndef BERGTOW_ESTIMATE_H
 #define BERGTOW_ESTIMATE_H
 
@@ -93,6 +94,7 @@ typedef struct bt_estimate_input {
     double p_star, p_s;      ///< Pa, N/m: divided by the length scale and its square
     double c_si, kappa, kappa_low, kappa_high, phi_j;
     double length_scale;     ///< by which P* and P_s were divided
+    bool channel;            ///< a lead without floes ahead of the body (lead.mode): no run is held against estimates
 } bt_estimate_input;
 
 /// One estimate.
@@ -100,8 +102,8 @@ typedef struct bt_estimate {
     double force;     ///< N against the tow; NaN: the formula has no value here
     double low, high; ///< N, its range; equal to force where there is none
     bool valid;       ///< the formula is meant for these conditions
-    /// valid, and it knows the concentration of the ice: a run is held against it. Not where the body all but stands
-    /// still and the force depends on its speed
+    /// valid, and it knows the concentration of the ice: a run is held against it. Not in a channel, nor where the body
+    /// all but stands still and the force depends on its speed
     bool compares;
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;

@@ -10,6 +10,8 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "base/tree.h"
+#include "base/units.h"
+#include "case/schema.h"
 #include "case/case_base.h"
 #include "run/study_axes.h"
 
@@ -185,8 +187,12 @@ static void print_parameter(const bt_study *s, const bt_study_parameter *p)
 {
     printf("%-20s ", p->name);
     if (p->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+        // with its unit: these are SI numbers, and a bare one of an angle would be read in degrees
+        const bt_key *key = p->key >= 0 ? &bt_case_keys[p->key] : NULL;
+        const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
         char *distribution = bt_study_distribution(p);
-        printf("%s%s%s\n", distribution, p->source ? "; source: " : "", p->source ? p->source : "");
+        printf("%s%s%s%s%s\n", distribution, *unit ? " " : "", unit, p->source ? "; source: " : "",
+               p->source ? p->source : "");
         free(distribution);
         return;
     }

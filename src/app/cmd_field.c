@@ -86,6 +86,12 @@ int bt_cmd_field(int argc, char **argv)
     bt_errors warnings = {0};
     if (status == BT_OK) {
         const double took = bt_clock() - start;
+        if (c.lead.mode != BT_LEAD_NONE)
+            bt_errors_add(&warnings,
+                          "lead.mode: %s: the file holds the ice as it is before the lead, which a run of the case "
+                          "that reads the file opens in it",
+                          c.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
+        c.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: its sizes are as they were drawn
         const bt_field_sizes sizes = bt_field_sizes_of(&c, &f);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
                f.concentration, f.ice_area, sizes.mean, bt_case_reads_field(&c) ? "read" : "made", took);

@@ -122,23 +122,31 @@ static void fill_sheets(const bt_manifold *m, bt_idx pair, bt_contact *u, bt_gap
     *g = (bt_gaps){0};
 }
 
-static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_held *h, bt_contact *u,
-                         bt_gaps *g)
+void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u)
 {
     const bt_bodies *b = &w->bodies;
     const double nx = m->nx, ny = m->ny;
     *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points,
-                      .pair = pair};
-    *g = (bt_gaps){0};
+                      .pair = u->pair};
     for (int i = 0; i < m->n_points; i++) {
         const bt_point *q = &m->p[i];
         u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
         u->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
-        g->gap[i] = q->gap;
-        g->feature[i] = q->feature;
     }
     u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
     u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
+}
+
+static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_held *h, bt_contact *u,
+                         bt_gaps *g)
+{
+    u->pair = pair;
+    bt_pack_rows(w, m, u);
+    *g = (bt_gaps){0};
+    for (int i = 0; i < m->n_points; i++) {
+        g->gap[i] = m->p[i].gap;
+        g->feature[i] = m->p[i].feature;
+    }
     if (w->par.warm_start) inherit(m, h, u);
     bt_pack_bias(w, u, g, 1);
 }

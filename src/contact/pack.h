@@ -33,6 +33,9 @@ void bt_pack_keep(bt_pack_scratch *s);
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s);
 void bt_pack_scratch_free(bt_pack_scratch *s);
 
+/// Normal and arms of a contact, from its manifold.
+void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u);
+
 /// Normal biases of a contact with these gaps, `share`: factor on the restitution.
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
 

@@ -185,7 +185,8 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 {
     const bt_estimate_def *d = &estimates[kind];
     bt_estimate e = force_of(d, in);
-    e.compares = e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0 && !in->turns;
+    e.compares =
+        e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0 && !in->turns && !in->channel;
     if (e.compares && in->along < BT_EST_STILL * in->ordered) {
         bt_estimate_input faster = *in;
         faster.along *= 2, faster.speed *= 2;
@@ -234,6 +235,7 @@ void bt_estimate_ordered(const bt_case *c, const double ice[2], bt_estimate_inpu
         .kappa_high = c->estimate.kappa_high,
         .phi_j = c->estimate.phi_j,
         .length_scale = scale,
+        .channel = c->lead.mode == BT_LEAD_CHANNEL,
     };
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);

@@ -120,6 +120,7 @@ double bt_sizes_mean_area(const bt_sizes *s)
 }
 
 #define SIZE_OFF 0.05   // of the mean, from which on it is said
+#define SPREAD_OFF 0.1  // of the spread, likewise
 #define BELOW_OFF 0.01  // of the floes, likewise
 #define BELOW_SLACK 1e-2 // of size_min: a common factor near 1 brings the areas to the concentration
 
@@ -152,6 +153,13 @@ void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors
                           "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
                           "count on the diameter that was made",
                           (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+        const double spread = sqrt(bt_max(second - mean * mean, 0)) / mean;
+        if (s.law == BT_SIZE_LOGNORMAL && spread < (1 - SPREAD_OFF) * s.spread)
+            bt_errors_add(warnings,
+                          "ice.size_min and ice.size_max leave the sizes a spread of %.2g, where ice.size_spread asks "
+                          "for %.2g: all that is drawn beyond them is drawn again; move them apart, or lower "
+                          "ice.size_spread",
+                          spread, s.spread);
         if (found->below > BELOW_OFF * n)
             bt_errors_add(warnings,
                           "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "

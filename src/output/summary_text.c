@@ -133,7 +133,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
         const bt_estimate_input *in = &s->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
         if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
-        printf(": force, ice resistance of this run / estimate where that knows the concentration and holds, regime\n");
+        printf(": force, ice resistance of this run / estimate where that knows the concentration%s and holds, "
+               "regime\n",
+               in->channel ? " (none knows the channel)" : "");
         bt_estimates_print(in, bt_summary_held_against(s), "    ", false);
     }
     if (h->n)

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/lock.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
 #include "run/ensemble_journal.h"
@@ -48,9 +49,12 @@ static int check_member(bt_ensemble *e, bt_entry *x, bt_errors *warnings)
     if (status == BT_ERR_CASE) {
         const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
         bt_errors again = {0};
-        if (fd < 0 || !bt_member_take_lock(fd, false) ||
-            bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
-            bt_errors_free(&why); // another process has found it out, too
+        bool busy = false; // with a run of its own, as of `bergtow resume`
+        const int run =
+            fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(x->folder, &busy, &again) : -1;
+        bt_errors_free(&again);
+        if (run < 0 || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+            bt_errors_free(&why); // another process has found it out, too, or is at it
         } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
             bt_errors_free(&why); // and made it good meanwhile
             status = BT_OK;
@@ -59,6 +63,7 @@ static int check_member(bt_ensemble *e, bt_entry *x, bt_errors *warnings)
             bt_ensemble_journal(e, "unsound", &x->m, 0, (int)status);
         }
         bt_errors_free(&again);
+        bt_lock_drop(x->folder, run);
         if (fd >= 0) close(fd);
     }
     for (size_t k = 0; k < why.n && k < 1; k++)

@@ -7,17 +7,49 @@
 // by the same rows without friction, in rounds over the points that bear or overlap (rounds.h). Touching contacts (g2 ≥
 // −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
 // (Baumgarte) would add kinetic energy and load that is not there (Metrikin 2014).
+//
+// Second pass. The gaps above are linear in the turns of a step. Two bodies that turn by θ against each other may end
+// θ²/2 of their radii inside each other: at 5 s a floe that rolls along a hull does. So where a turn can have left more
+// than LEFT slops, those pairs are looked for anew where they are now: the floe that rolls along a hull touches it
+// metres from where it did. If one of them is that deep, their new rows part the bodies once more, with the rows of all
+// other pairs as they were; then contacts are again those that bore the loads of the step. Most steps have no such
+// turn; most that have need no second pass. Not for the plain reference, which also makes the fields.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "contact/law.h"
+#include "contact/pack.h"
+#include "contact/row.h"
 #include "solve/solver.h"
 #include "partition/domain.h"
 #include "solve/batch.h"
 #include "solve/kernel.h"
 #include "space/phases.h"
 #include "solve/rounds.h"
+
+enum { TURNS, N_FOUND };
+enum { LEFT = 5 }; // slops that a turn may leave as overlap: half of what a run warns of, assumed
+
+/// May the turn of contact j in this step, whose gaps are those at its end, have left more than `least` of overlap, m?
+/// Only of pairs that touch with their outlines as they are: what has given way is no overlap.
+static bool turns(const bt_world *w, const bt_cell *cell, bt_idx j, double least)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_contact *u = &cell->contacts[j];
+    const bt_vel *va = &b->vel[u->a], *vb = &b->vel[u->b];
+    const double turn = w->par.dt * fabs(vb->w - va->w);
+    if (turn == 0 || u->n == 0) return false;
+    const double *g = cell->gaps[j].gap, gap = u->n > 1 ? bt_min(g[0], g[1]) : g[0];
+    const double slip = w->par.dt * fabs(bt_tangent_velocity(u, va, vb));
+    const double error = turn * (0.5 * turn * (b->radius[u->a] + b->radius[u->b]) + slip);
+    if (!(bt_max(gap, -w->par.slop) - error < -least)) return false;
+    if (!cell->laws.limits) return true;
+    const bt_limit *l = &cell->laws.limits[j];
+    for (int law = 0; law < BT_ALL_LAWS; law++)
+        if (l->record[law] >= 0) return false;
+    return l->grown[0] == 0 && l->grown[1] == 0;
+}
 
 /// Fields are shaken plain, and keep their bits.
 static bool in_batches(const bt_cell *cell, bool plain) { return bt_batch_projects(cell) && !plain; }
@@ -43,7 +75,45 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
             if (cell->laws.limits) g->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->gap[i]);
         }
+        if (!w->par.plain_sweeps && turns(w, cell, j, LEFT * w->par.slop)) bt_sum_add(&t->sum[TURNS], 1);
     }
+}
+
+/// Keep contact j of cell k as it is.
+static void keep(bt_solver *s, bt_idx k, bt_idx j, const bt_contact *u)
+{
+#pragma omp critical(bt_project_keep)
+    {
+        if (s->n_kept == s->cap_kept)
+            s->kept = bt_realloc(s->kept, (size_t)(s->cap_kept = 2 * s->cap_kept + 8), sizeof *s->kept);
+        s->kept[s->n_kept++] = (bt_kept_rows){k, j, *u};
+    }
+}
+
+/// Gaps after the first pass, and new rows of the pairs that have turned.
+static void find_left(bt_world *w, bt_idx k, const void *shifted, bt_totals *t)
+{
+    bt_cell *cell = &w->cells->cell[k];
+    const bt_vel *d = w->solver->shift;
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        bt_contact *u = &cell->contacts[j];
+        bt_gaps *g = &cell->gaps[j];
+        for (int i = 0; i < u->n && *(const bool *)shifted; i++)
+            g->gap[i] += bt_normal_velocity(u, i, &d[u->a], &d[u->b]);
+        if (!turns(w, cell, j, LEFT * w->par.slop)) continue;
+        bt_manifold m;
+        double gap;
+        const bt_pair *p = &cell->search.pairs[u->pair];
+        int32_t axis = p->axis;
+        if (!bt_contacts_parts(w, u->a, u->b, p->part, 0, (int)(g->feature[0] >> 31), &m, &gap, &axis)) continue;
+        keep(w->solver, k, j, u);
+        bt_pack_rows(w, &m, u);
+        for (int i = 0; i < m.n_points; i++) {
+            g->gap[i] = m.p[i].gap;
+            t->most = bt_max(t->most, -g->gap[i]);
+        }
+    }
+    begin(w, cell); // with the new rows
 }
 
 static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, const bt_problem *p)
@@ -130,19 +200,12 @@ void bt_solver_make_shift(bt_world *w)
     s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
 }
 
-void bt_solver_project(bt_world *w)
+/// Part what overlaps by the gaps as they have been found: bt_solver.shift.
+static void part(bt_world *w)
 {
-    bt_solver *s = w->solver;
     const bt_cells *ts = w->cells;
+    bt_solver *s = w->solver;
     bt_step_stats *st = &w->stats;
-    st->position_sweeps = st->position_updates = 0;
-    st->projected = true;
-    bt_totals t = {0};
-    bt_phases_any_order(w, find_overlap, NULL, &t);
-    bt_domain_reduce(w, &t);
-    s->shifted = t.most > w->par.slop;
-    if (!s->shifted) return;
-
     bt_solver_make_shift(w);
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
@@ -164,8 +227,40 @@ void bt_solver_project(bt_world *w)
         while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
             work.residual = bt_rounds_sweep(w, &p, &work);
     else bt_rounds_run(w, &p, &work);
-    st->position_sweeps = work.sweeps;
-    st->position_updates = work.updates;
-    st->projected = work.residual <= p.tolerance;
-    bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
+    st->position_sweeps += work.sweeps;
+    st->position_updates += work.updates;
+    st->projected = st->projected && work.residual <= p.tolerance;
+    bt_domain_settle(w, s->shift);
+}
+
+void bt_solver_project(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_step_stats *st = &w->stats;
+    st->position_sweeps = st->position_updates = 0;
+    st->projected = true;
+    s->n_kept = 0;
+    bt_totals t = {.n_sums = N_FOUND};
+    bt_phases_any_order(w, find_overlap, NULL, &t);
+    bt_domain_reduce(w, &t);
+    s->turned = bt_sum_value(&t.sum[TURNS]) > 0;
+    s->shifted = t.most > w->par.slop;
+    if (s->shifted) part(w);
+}
+
+bool bt_solver_project_again(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    if (!s->turned) return false;
+    bt_totals t = {0};
+    bt_phases_any_order(w, find_left, &s->shifted, &t);
+    bt_domain_reduce(w, &t);
+    const bool deep = t.most > LEFT * w->par.slop;
+    if (deep) part(w);
+    for (bt_idx i = 0; i < s->n_kept; i++) {
+        const bt_kept_rows *q = &s->kept[i];
+        w->cells->cell[q->cell].contacts[q->at] = q->was;
+    }
+    s->shifted = s->shifted || deep;
+    return deep;
 }

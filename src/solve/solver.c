@@ -32,8 +32,10 @@ static void give_back(bt_solver *s)
 {
     free(s->before);
     free(s->shift);
+    free(s->kept);
     s->before = s->shift = NULL;
-    s->cap_before = s->cap_bodies = 0;
+    s->kept = NULL;
+    s->cap_before = s->cap_bodies = s->cap_kept = 0;
 }
 
 void bt_solver_free(bt_solver *s)

@@ -44,6 +44,12 @@
 #include "tow/tow.h"
 #include "bergtow/world.h"
 
+/// A contact that has other rows for a moment (src/solve/project.c).
+typedef struct bt_kept_rows {
+    bt_idx cell, at;
+    bt_contact was;
+} bt_kept_rows;
+
 typedef struct bt_solver {
     bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
     bt_idx cap_before;
@@ -51,7 +57,10 @@ typedef struct bt_solver {
     double line_best[BT_MAX_BRANCHES]; ///< and of the best residual pass, while they are kept
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
     bt_idx cap_bodies;
-    bool shifted;                ///< the projection did something this step
+    bool shifted;                ///< the projection, or its second pass, has moved something
+    bool turned;                 ///< some pair has turned so far that there may be a second pass
+    bt_kept_rows *kept;            ///< [n_kept] in any order
+    bt_idx n_kept, cap_kept;
     bool rebounds;               ///< some contact of this step has a restitution
     struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
 } bt_solver;
@@ -75,5 +84,9 @@ void bt_solver_make_shift(bt_world *w);
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *w);
+
+/// Collective. After the poses have moved: a second pass where turns have left overlap (solve/project.c). True: there
+/// are displacements, by which alone the poses move once more.
+bool bt_solver_project_again(bt_world *w);
 
 #endif

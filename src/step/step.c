@@ -19,21 +19,22 @@
 #include "partition/domain.h"
 #include "space/phases.h"
 
-/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there
+/// Move body i by its velocity over dt, and by its displacement; returns the length of its path through the water's
+/// frame, m. Displacements of the projection are there
 /// only for cells that contacts may move: for others their array still holds what it held, maybe of other bodies.
-static double move(bt_world *w, bt_idx i, bool shifted)
+static double move(bt_world *w, bt_idx i, double dt, bool shifted)
 {
     bt_bodies *b = &w->bodies;
     const bt_solver *s = w->solver;
-    const double dt = w->par.dt, drift_x = w->par.water_u, drift_y = w->par.water_v;
+    const double drift_x = w->par.water_u, drift_y = w->par.water_v;
     double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
     double x = dt * (b->vel[i].x - drift_x), y = dt * (b->vel[i].y - drift_y);
-    b->disturbed[i] = 0;
+    if (dt > 0) b->disturbed[i] = 0;
     if (shifted) {
         const bt_vel d = s->shift[i];
         dx += d.x, dy += d.y, turn += d.w;
         x += d.x, y += d.y;
-        b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;
+        if (d.x != 0 || d.y != 0 || d.w != 0) b->disturbed[i] = 1;
     }
     if (dx == 0 && dy == 0 && turn == 0 && w->cells->still) return 0; // most floes of a cell that moves
     bt_pose *p = &b->pose[i];
@@ -67,26 +68,42 @@ static bool at_rest(const bt_world *w, const bt_cell *t)
     return true;
 }
 
+typedef struct {
+    double dt; ///< s, 0: by the displacements alone
+    bool can_sleep, shifted;
+} way;
+
 /// The maxima: the farthest path, and how far a floe stands outside its cell, m.
-static void advance_cell(bt_world *w, bt_idx k, const void *can_sleep, bt_totals *most)
+static void advance_cell(bt_world *w, bt_idx k, const void *context, bt_totals *most)
 {
+    const way *by = context;
     bt_cells *ts = w->cells;
     const bt_cell *t = &ts->cell[k];
-    const bool last = k == ts->n - 1, moves = last || bt_cells_moves(ts, k), shifted = w->solver->shifted && moves;
+    const bool last = k == ts->n - 1, moves = last || bt_cells_moves(ts, k), shifted = by->shifted && moves;
     if (!moves && ts->still) return;
     double path = 0, out = 0;
     for (bt_idx i = t->first; i < t->end; i++) {
-        const double way = move(w, i, shifted);
-        path = bt_max(path, way);
-        if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(w, i)); // no farther than before
+        const double length = move(w, i, by->dt, shifted);
+        path = bt_max(path, length);
+        if (!last && (length > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(w, i)); // no farther than before
     }
     ts->moved[k] += path;
     most->most2 = bt_max(most->most2, out);
     if (!last) most->most = bt_max(most->most, path);
     if (!moves || last) return;
-    if (!*(const bool *)can_sleep || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
+    if (!by->can_sleep || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
     // where forces have been informed, they would find what they found
     else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
+}
+
+static void move_bodies(bt_world *w, way by)
+{
+    bt_cells *ts = w->cells;
+    bt_totals t = {0};
+    bt_phases_busy(w, advance_cell, &by, &t);
+    ts->moved_any += t.most;
+    bt_domain_maxima(w, &t.most2, 1);
+    ts->relabel = ts->relabel || t.most2 > ts->allowance;
 }
 
 /// X2 = X1 + U2 Δt + D.
@@ -98,11 +115,9 @@ static void advance(bt_world *w)
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
     const bool can_sleep = bt_forces_rest(w);
-    bt_totals t = {0};
-    bt_phases_busy(w, advance_cell, &can_sleep, &t);
-    ts->moved_any += t.most;
-    bt_domain_maxima(w, &t.most2, 1);
-    ts->relabel = t.most2 > ts->allowance;
+    ts->relabel = false;
+    move_bodies(w, (way){w->par.dt, can_sleep, w->solver->shifted});
+    if (bt_solver_project_again(w)) move_bodies(w, (way){0, can_sleep, true});
     bt_tow_advance(w);
 }
 

@@ -399,10 +399,10 @@ def test_what_is_refused(small, tmp_path):
     assert "no such file" in subprocess.run([BERGTOW, "budget", "none.yml"], env=environment(BERGTOW_HOME=ROOT),
                                             cwd=tmp_path, capture_output=True, text=True).stderr
     assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
-    assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out")
+    assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out", code=2)
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
     for wrong in ("tow_force:101", "tow_force:0"):
-        assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out")
+        assert "above 0 and at most at 100 %" in said(STUDY, "--of", wrong, out=folder / "out", code=2)
     # the folder holds another study: its numbers are no answer to this one
     for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
         assert "another study" in said(study, *more, out=folder / "out", code=3)

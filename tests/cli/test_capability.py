@@ -333,11 +333,11 @@ def test_a_line_that_parts_is_no_tow(tmp_path):
 
 
 def test_what_is_refused(tmp_path):
-    assert "mode speed, which no ice stops; set tow.mode to thrust" in found_in(tmp_path, TOW, code=4)
+    assert "mode speed, which no ice stops; set tow.mode to thrust" in found_in(tmp_path, TOW, code=3)
     assert "say its range with --from and --to" in found_in(tmp_path, THRUST, "--search", "ice.friction", code=2)
     assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=3)
-    assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=4)
-    assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=4)
+    assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=2)
+    assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=2)
     for more in (("--for", "ice.concentration=0.5,0.6"), ("--set", "ice.concentration = 0.5"),
                  ("--for", "ice.thickness=1,2", "--set", "ice.thickness=1")):
         assert "is given by more than one of --search, --for and --set" in found_in(tmp_path, THRUST, *more, code=2)
@@ -346,10 +346,10 @@ def test_what_is_refused(tmp_path):
         {"type": "Feature", "properties": {}, "geometry": square}]}))
     case = changed(THRUST, ice__outlines="floes.geojson", ice__outlines_crs="frame", ice__concentration=None,
                    ice__size=None)
-    assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=4)
+    assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
     assert "4 is no whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
-    assert "each field has a seed of its own" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=4)
+    assert "each field has a seed of its own" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
 
 
 def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, monkeypatch):

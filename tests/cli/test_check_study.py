@@ -104,6 +104,17 @@ def test_a_hypercube_and_variants(tmp_path):
                 ) == "30 conditions x 1 fields = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"
 
 
+def test_ends_of_a_distribution_stand_with_their_unit(tmp_path):
+    """They are SI numbers. Red when they stand alone: a bare number of an angle is one of degrees."""
+    text = checked(tmp_path, {
+        "base": "base.yml", "sampling": "latin-hypercube", "samples": 2,
+        "parameters": {"body.yaw": {"from": "-30 deg", "to": "60 deg", "distribution": "triangular"},
+                       "tow.speed": {"from": "0.1 kn", "to": "0.2 kn", "source": "a log"}}
+    })
+    assert line(text, "body.yaw") == "triangular from -0.523599 to 1.0472 rad"
+    assert line(text, "tow.speed") == "uniform from 0.0514444 to 0.102889 m/s; source: a log"
+
+
 def test_faults_name_place_and_conditions(tmp_path):
     found = checked(tmp_path, """base: base.yml
 parameters:

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import case_runs  # noqa: E402
 import converge  # noqa: E402
 import converge_text  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow_read import Run, RunError  # noqa: E402
 
 
 @pytest.mark.parametrize("n", [4, 8, 32])
@@ -114,6 +114,13 @@ def test_a_start_without_a_ramp_is_held_against_one_of_the_own_size(tmp_path):
     assert row["judged"] == "matters" and row["recommended"] == pytest.approx(2 / 0.13, rel=0.2)
 
 
+def test_a_programme_has_a_start_of_its_own(tmp_path):
+    """Red: the ramp was varied, the program refused it beside a programme, and the call ended as one that failed."""
+    case = changed(LINE, tow__speed=None, tow__ramp=None, tow__programme=[[0, 0], [20, 0.13]])
+    found, text = converged(tmp_path, case, "--vary", "start", "--budget", 3)
+    assert [row["judged"] for row in found["rows"]] == ["open"] and "that of tow.programme" in text
+
+
 @pytest.mark.slow
 def test_a_ramp_ends_before_the_window(tmp_path):
     """Four times 10 s would end behind the beginning of the window at 30 s; and from 24 s on nothing is left to try."""
@@ -164,6 +171,8 @@ def test_what_is_refused(tmp_path):
                           capture_output=True, text=True)
     assert lost.returncode == 4 and "name the folder that holds postproc/ in BERGTOW_HOME" in lost.stderr
     assert bad.returncode == 3 and "unknown key" in bad.stderr and "Traceback" not in bad.stderr
+    short = said("case.yml", "--budget", 1e-4, "-o", "short")
+    assert short.returncode == 6 and "raise --budget" in short.stderr
     assert not (tmp_path / "out").exists()
     device = said("/dev/null", "-o", "out")
     assert device.returncode == 4 and "is a device" in device.stderr and "no such file" not in device.stderr
@@ -311,14 +320,14 @@ def test_fields_that_are_the_same_run_are_refused(tmp_path):
     settled(runs, 0, state_hash="b")
     assert runs.make("case", [0, 1], {}) == [None, None]
     settled(runs, 1, state_hash="b")
-    with pytest.raises(RunError, match="the ice is read, and no seed changes it"):
+    with pytest.raises(RunError, match="the ice is read.*no seed changes it"):
         runs.make("case", [0, 1], {})
 
 
 class Towed:
     """The case of a tow of this heading from 240 m in a domain of 300 m."""
 
-    path, case = "towed", {"domain.ends": "walls"}
+    path, case, case_text = "towed", {"domain.ends": "walls"}, ""
     value = {"domain.length": 300.0, "domain.ahead": np.nan, "domain.x0": 0.0, "body.x": 240.0}.get
 
     def __init__(self, *headings):
@@ -332,3 +341,18 @@ def test_the_length_grows_ahead_of_the_body():
     for headings in ((90,), (0, 90), (0, 180)):
         with pytest.raises(RunError, match="does not go along the domain"):
             converge.longer(Towed(*headings), 1)
+
+
+def test_an_ice_region_that_reaches_the_ends_of_the_domain_goes_with_them(tmp_path):
+    """Red when it stays: the pack is the same with open water beside it, "no effect" of a length that no ice fills and
+    a large one of a width."""
+    case = changed(CASE, ice__x_min=1, ice__x_max=20, ice__y_min=-3, run__duration=4, output__window_start=2)
+    width = case["domain"]["width"]
+    run(tmp_path, case, "--set", f"ice.y_max={width / 2}", name="given")
+    with Run(tmp_path / "given") as there:
+        assert converge.longer(there, 1) == {"domain.length": 30, "domain.x0": 0, "body.x": 3, "ice.x_max": 30}
+        # of two sides the one that the ice reaches; the other has open water of its own
+        assert converge.wider(there, 1) == {"domain.width": 2 * width, "domain.y0": -width, "ice.y_max": width}
+    run(tmp_path, changed(CASE, run__duration=4, output__window_start=2), name="own")
+    with Run(tmp_path / "own") as there:  # what the case does not give follows the domain by itself
+        assert set(converge.wider(there, 1)) == {"domain.width", "domain.y0"}

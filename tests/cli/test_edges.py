@@ -301,6 +301,20 @@ def test_what_leaves_no_sizes_is_refused(tmp_path):
     assert done.returncode == CASE and "move the limits apart" in done.stderr
 
 
+def test_limits_that_take_the_spread_of_sizes_away_are_told(tmp_path):
+    """Red: sizes between 0.96 and 1.04 m, where a spread of a half was asked for, without a word."""
+    def made(**ice):
+        case = changed(TOW, ice={"concentration": 0.5, "size_law": "lognormal", "size": 1, "size_spread": 0.5} | ice)
+        said = call("field", write_case(tmp_path, case), "-o", tmp_path / "field.h5", "--force").stdout
+        with h5py.File(tmp_path / "field.h5") as f:
+            size = np.sqrt(4 / np.pi * f["floes/area"][:])
+        return size.std() / size.mean(), re.search(r"leave the sizes a spread of ([\d.]+), where .* asks for 0.5", said)
+    spread, told = made(size_min=0.7, size_max=1.4)
+    assert told and float(told[1]) == pytest.approx(0.19, abs=0.01) and spread == pytest.approx(float(told[1]), rel=0.2)
+    spread, told = made(size_min=0.2, size_max=5)
+    assert not told and spread == pytest.approx(0.5, rel=0.2)
+
+
 def test_floes_below_the_least_size_are_counted(tmp_path):
     """Cells of a dense power law leave small floes less room than they ask for. Floes given by hand change nothing of
     it, and a resumed run says the same."""

@@ -141,6 +141,20 @@ def test_what_cannot_be_read_stays_and_is_a_hole(quiet, copy):
     assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == []
 
 
+def test_a_damaged_member_that_a_run_is_at_is_left_to_it(copy):
+    """Red: what `bergtow resume` was writing in a folder was taken away."""
+    import fcntl
+    member = copy / "all/members/c002-r002"
+    changed_digit(member / "summary.json")
+    there = sorted(p.name for p in member.iterdir())
+    with open(member / "run.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        result = ensemble(copy, "--no-wait")
+        assert result.returncode != DONE and "is run again" not in result.stderr, result.stderr
+        assert sorted(p.name for p in member.iterdir()) == sorted([*there, "run.lock"])
+    assert ensemble(copy).returncode == DONE
+
+
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="needs root, to run as another user")
 def test_without_permission(quiet, copy):
     member = copy / "all/members/c002-r001"

@@ -65,6 +65,19 @@ def test_a_managed_lead_keeps_the_mass(tmp_path):
     assert r.summary["momentum_residual"] < 1e-10
 
 
+def test_a_tow_in_a_channel_is_held_against_no_estimate(tmp_path):
+    """They are of the ice as it was before its floes were removed. Red when the ratio is that of open water to them;
+    pieces keep mass and concentration, and a ratio."""
+    case = changed(BASE, lead=MANAGED, ice__thickness_law=None, run__duration=15, output__window_start=5)
+    cut = run(tmp_path, case, name="cut")
+    channel = run(tmp_path, changed(case, lead=changed(CHANNEL, length=2)), name="channel")
+    momentum = [r.summary["estimates"]["marchenko_momentum"] for r in (cut, channel)]
+    assert momentum[0]["force_n"] == pytest.approx(momentum[1]["force_n"], rel=0.05) and momentum[1]["valid"]
+    assert [e["compares"] for e in momentum] == [True, False]
+    assert momentum[0]["simulated_over_estimate"] > 0 and "none knows the channel" in channel.result.stdout
+    assert "none knows the channel" not in cut.result.stdout
+
+
 def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     """`bergtow field` writes the ice as it was before the lead, since the case that reads it opens the lead."""
     case = changed(BASE, lead=MANAGED, run__duration=2)
@@ -77,6 +90,20 @@ def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
     assert f"{lead['floes_cut']} floes" in result.stdout and f"cut into {lead['pieces']} pieces" in result.stdout
     again = run(tmp_path, made.dir / "case.resolved.yml", name="again")
     assert again.hash == made.hash
+
+
+def test_a_field_says_that_its_lead_is_not_in_it(tmp_path):
+    """A map of the ice of a case with a lead shows none; and its floes, none of which is a piece, are held against the
+    size law as without a lead. Red when nothing is said."""
+    sizes = dict(ice__size_law="power", ice__size_min=0.2, ice__size_max=5, ice__size=None, ice__size_spread=None,
+                 ice__concentration=0.8)
+    write_case(tmp_path, changed(BASE, lead=MANAGED, run__duration=2, **sizes))
+    said = call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").stdout
+    assert "warning: lead.mode: managed: the file holds the ice as it is before the lead" in said
+    write_case(tmp_path, changed(BASE, run__duration=2, **sizes))
+    without = call("field", tmp_path / "case.yml", "-o", tmp_path / "g.h5").stdout
+    below = [line for line in without.splitlines() if "smaller than ice.size_min" in line]
+    assert below and below[0] in said and "lead" not in without
 
 
 def test_a_lead_beyond_the_front_of_a_moving_window_goes_round_it(tmp_path):

@@ -450,6 +450,29 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
         rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
 
 
+def test_what_moves_water_and_air_and_a_lead_stand_in_what_a_value_holds_for():
+    """Red when the statement says "no current" of a case without one, and of one with a current nothing at all; or
+    names the floes of ice that was cut or removed ahead of the body, and not that it was."""
+    def said(varied=(), **texts):
+        case = statement_module.Case(False, False, "line", {}, np.nan, 0.0, {k.replace("__", "."): v
+                                                                             for k, v in texts.items()})
+        return statement_module._holds_for(argparse.Namespace(parameters=dict.fromkeys(varied)), case)
+    still = {"water__current_x": "0 m/s", "air__wind_x": "0 m/s", "air__wind_table": "none", "lead__mode": "none"}
+    assert said(**still) == "no current, no wind"
+    moved = still | {"water__current_x": "-0.5 m/s", "air__wind_table": "/home/me/wind.csv",
+                     "water__tide__major": "1 m/s"}
+    assert said(**moved) == "water current x -0.5 m/s, water tide major 1 m/s, air wind table wind.csv"
+    assert said(["water.current_x", "air.wind_x"], **moved) == "water tide major 1 m/s, air wind table wind.csv"
+    assert said(["water.current_x"], **still) == "no wind"
+    lead = {"lead__width": "66.66666666666667 m", "lead__length": "400 m", "lead__floe_size": "15 m"}
+    for mode, pieces in (("channel", "without floes"), ("managed", "of pieces up to 15 m")):
+        assert said(**still | lead | {"lead__mode": mode}).startswith(
+            f"a lead 66.6667 m wide and 400 m long {pieces}, no current")
+    assert said(["lead.floe_size", "lead.width"], **lead | {"lead__mode": "managed"}) == \
+        "a lead 400 m long of pieces, no current, no wind"
+    assert said(["lead.mode"], **still | lead | {"lead__mode": "channel"}) == "no current, no wind"
+
+
 def test_members_of_an_earlier_program_say_it_in_their_warnings(tmp_path):
     e = Ensemble(towed(tmp_path / "a", fields=2, earlier=True))
     for k, c in enumerate(e.conditions()):

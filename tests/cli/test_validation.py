@@ -80,6 +80,17 @@ def test_a_measured_force_gets_its_ratio(tmp_path):
     assert ratio == pytest.approx(r.summary["mean_ice_resistance_n"] / 2)
 
 
+def test_every_run_of_the_scripts_is_one_that_check_takes(tmp_path):
+    """Red: a key that has no effect on the ice of a part stops a study after an hour (seen: its concentration)."""
+    todo = [("arching", values) for part in arching.PARTS for _, _, values in arching.prepared(tmp_path, part, 1)]
+    todo += [("barrier", values) for _, _, values in barrier.jobs(1)] + [("ship", values) for _, _, values in ship.jobs(1)]
+    assert len(todo) > 80
+    for name, values in todo:
+        sets = [word for key, value in values.items() for word in ("--set", f"{key.replace('__', '.')}={value}")]
+        result = call("check", FOLDER / f"{name}.yml", *sets)
+        assert result.returncode == DONE, (name, values, result.stderr)
+
+
 # --- arching ---------------------------------------------------------------------------------------------------------
 
 

@@ -265,6 +265,35 @@ static void confined_row(void **state)
     bt_world_free(w);
 }
 
+/// A square that lies on another by a fifth turns by 0.1 rad and more in a step: its pose follows from its velocity
+/// alone, and what has slid over the other stays there.
+static void a_turn_takes_no_raft_back(void **state)
+{
+    (void)state;
+    const double a = 10, dt = 2;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_box(w, HELD, a, a, -0.5 * a, 0, h);
+    const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 1e-6, h),
+                 right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0);
+    set_speed(w, right, -0.05);
+    while (0.5 * a - pose(w, floe)->x < 0.2 * a) bt_world_step(w);
+    set_speed(w, right, 1);
+    bt_world_step(w);
+    for (int s = 0; s < 3; s++) {
+        *vel(w, floe) = (bt_vel){.w = 0.2};
+        const bt_pose before = *pose(w, floe);
+        bt_world_step(w);
+        const bt_vel v = *vel(w, floe);
+        assert_true(fabs(v.w) * dt > 0.1 && w->stats.converged);
+        CHECK_CLOSE(pose(w, floe)->x, before.x + v.x * dt, 2 * p.slop);
+        CHECK_CLOSE(pose(w, floe)->y, before.y + v.y * dt, 2 * p.slop);
+        CHECK_CLOSE(pose(w, floe)->yaw, before.yaw + v.w * dt, 1e-3);
+        assert_true(scene_law(w, "rafted_area") > 0.1 * a * a);
+    }
+    bt_world_free(w);
+}
+
 /// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the
 /// thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that a hull drives into the pack: the hull itself
 /// does not raft, and its load is that of the edge behind.
@@ -424,6 +453,7 @@ int main(void)
         cmocka_unit_test(pushed_shut),
         cmocka_unit_test(out_behind),
         cmocka_unit_test(confined_row),
+        cmocka_unit_test(a_turn_takes_no_raft_back),
         cmocka_unit_test(apex_under_an_edge),
         cmocka_unit_test(structures_do_not_raft),
         cmocka_unit_test(plough_in_a_channel),
