@@ -98,8 +98,8 @@ static void find_left(bt_world *w, bt_idx k, const void *shifted, bt_totals *t)
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         bt_contact *u = &cell->contacts[j];
         bt_gaps *g = &cell->gaps[j];
-        for (int i = 0; i < u->n && *(const bool *)shifted; i++)
-            g->gap[i] += bt_normal_velocity(u, i, &d[u->a], &d[u->b]);
+        for (int i = 0; i < u->n; i++)
+            if (*(const bool *)shifted) g->gap[i] += bt_normal_velocity(u, i, &d[u->a], &d[u->b]);
         if (!turns(w, cell, j, LEFT * w->par.slop)) continue;
         bt_manifold m;
         double gap;
