@@ -220,8 +220,8 @@ class CaseRuns:
                 sorted((self.folder / self.subject / name).glob("f*/summary.json"))[:2]]
         first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
         if first is not None and first == second:
-            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or given "
-                           "floe by floe, and no seed changes it", "let the program make the ice, by removing "
+            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or "
+                           "given floe by floe, and no seed changes it", "let the program make the ice, by removing "
                            "ice.outlines, ice.field or floes", BAD_CASE)
 
     def there(self, name, n, values):

@@ -14,7 +14,8 @@ MADE = "cli/test_made_good.py::test_"
 PUT = "cli/test_python_stepping.py::test_"
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
-PROJECT = ["physics/test_contact_law", "physics/test_impacts", "physics/test_rafting", "scenes:speed_dense,walls_closing"]
+PROJECT = ["physics/test_contact_law", "physics/test_impacts", "physics/test_rafting",
+           "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 COPIES = "parallel/test_copies.py::test_ranks_hold_what_they_need"
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
@@ -200,7 +201,8 @@ MUTANTS = {
         ("s->shifted = t.most > w->par.slop;", "s->shifted = t.most > 2 * w->par.slop;", "no shift below two slops"),
         (".tolerance = 0.1 * w->par.slop", ".tolerance = w->par.slop", "projection ends early"),
         (".length = 25", ".length = 5", "rounds of another length"),
-        ("st->projected = st->projected && work.residual <= p.tolerance;", "", "what is left of overlap is not reported"),
+        ("st->projected = st->projected && work.residual <= p.tolerance;", "",
+         "what is left of overlap is not reported"),
         ("bt_domain_settle(w, s->shift);", "", "ghosts are not shifted"),
         ("if (!s->turned) return false;", "return false;", "floes that turn stay inside a hull"),
         ("    s->n_kept = 0;\n", "", "contacts of an earlier step come back"),
@@ -439,14 +441,14 @@ MUTANTS = {
     "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment", COPIES,
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
-        ("b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;", "", "shifted floes are taken for quiet"),
+        ("if (d.x != 0 || d.y != 0 || d.w != 0) b->disturbed[i] = 1;", "", "shifted floes are taken for quiet"),
         ("p->x = bt_into_period(p->x + dx, w->par.x0, w->par.period_x, &b->lap[i]);", "p->x += dx;",
          "floes leave the periodic domain"),
         ("w->tow->travel_y += dy;", "", "way of the body across"),
         ("b->radius[i] * fabs(turn)", "0 * fabs(turn)", "turning adds no path"),
         ("|| b->vel[i].w != 0)", ")", "a turning floe sleeps"),
-        ("if (!*(const bool *)can_sleep || !at_rest(w, t))", "if (!at_rest(w, t))", "floes sleep in the wind"),
-        ("ts->relabel = t.most2 > ts->allowance;", "ts->relabel = t.most2 > 3 * ts->allowance;", "labels too late"),
+        ("if (!by->can_sleep || !at_rest(w, t))", "if (!at_rest(w, t))", "floes sleep in the wind"),
+        ("t.most2 > ts->allowance;", "t.most2 > 3 * ts->allowance;", "labels too late"),
         ("bt_domain_maxima(w, &t.most2, 1);", "", "ranks disagree on labels"),
         ("ts->moved_any += t.most;", "", "lists of the body grow old"),
         ("bt_sum_add(&all.sum[APPLIED_Y], b->lambda * b->ly);", "", "the line is left out of the balance"),

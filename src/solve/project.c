@@ -82,7 +82,7 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
 /// Keep contact j of cell k as it is.
 static void keep(bt_solver *s, bt_idx k, bt_idx j, const bt_contact *u)
 {
-#pragma omp critical(bt_project_keep)
+#pragma omp critical
     {
         if (s->n_kept == s->cap_kept)
             s->kept = bt_realloc(s->kept, (size_t)(s->cap_kept = 2 * s->cap_kept + 8), sizeof *s->kept);

@@ -192,10 +192,12 @@ static void what_is_parted_stays_where_it_is(void **state)
     add_square(w, 20, 0, 0, 0, 0, 1, 0, 0);
     double v[8];
     scene_square(1, v);
-    bt_world_add(w, &(bt_body_def){.motion = BT_KINEMATIC, .n_vertices = 4, .vertices = v, .x = 21.01, .yaw_rate = 0.6});
+    bt_world_add(
+        w, &(bt_body_def){.motion = BT_KINEMATIC, .n_vertices = 4, .vertices = v, .x = 21.01, .yaw_rate = 0.6});
     bt_world_step(w);
     assert_true(w->solver->n_kept > 0);
-    CHECK_CLOSE(w->bodies.pose[bt_world_index(w, 1)].x - w->bodies.pose[bt_world_index(w, 0)].x, 1 - p.slop, 0.2 * p.slop);
+    const bt_pose *pose = w->bodies.pose;
+    CHECK_CLOSE(pose[bt_world_index(w, 1)].x - pose[bt_world_index(w, 0)].x, 1 - p.slop, 0.2 * p.slop);
     bt_world_free(w);
 }
 
@@ -210,7 +212,8 @@ static void check_rows(const bt_world *w)
         for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
             const bt_contact *u = &w->cells->cell[k].contacts[j];
             bt_apply(u, u->ln[0] + u->ln[1], u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1],
-                     u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, b->inv[u->a], b->inv[u->b], &v[u->a], &v[u->b]);
+                     u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, b->inv[u->a], b->inv[u->b], &v[u->a],
+                     &v[u->b]);
         }
     for (bt_idx i = 0; i < b->n; i++) {
         CHECK_CLOSE(b->vel[i].x, v[i].x, 1e-12);
@@ -231,7 +234,10 @@ static double roll_along_a_hull(bool plain, int64_t *passes)
     bt_world *w = bt_world_create(&p);
     double v[2 * HULL], deepest = 0;
     uint64_t rng = 11;
-    for (int k = 0; k < HULL; k++) v[2 * k] = 40 * cos(2 * BT_PI * k / HULL), v[2 * k + 1] = 40 * sin(2 * BT_PI * k / HULL);
+    for (int k = 0; k < HULL; k++) {
+        v[2 * k] = 40 * cos(2 * BT_PI * k / HULL);
+        v[2 * k + 1] = 40 * sin(2 * BT_PI * k / HULL);
+    }
     bt_world_add(w, &(bt_body_def){.motion = BT_KINEMATIC, .large = true, .n_vertices = HULL, .vertices = v, .vx = 0.5,
                                    .friction = 0.35});
     for (int k = 0; k < FLOES; k++) {
@@ -261,8 +267,8 @@ static void floes_that_roll_do_not_enter_a_hull(void **state)
     (void)state;
     int64_t never, passes;
     const double once = roll_along_a_hull(true, &never), twice = roll_along_a_hull(false, &passes);
-    print_message("deepest overlap %.3f m by one projection, %.3f m with the second (%d steps looked again)\n", once, twice,
-                  (int)passes);
+    print_message("deepest overlap %.3f m by one projection, %.3f m with the second (%d steps looked again)\n", once,
+                  twice, (int)passes);
     assert_int_equal(never, 0);
     assert_true(once > 12 * 0.03 && twice < 6 * 0.03 && passes > 0);
 }
