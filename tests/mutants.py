@@ -294,6 +294,8 @@ MUTANTS = {
     "src/solve/batch.c": (SOLVE + ["scenes:walls_closing"], [
         ("to->before[c] = o->before[c][l], to->", "to->before[c] = o->x[c][l], to->", "no momentum from list to list"),
         ("to->multiplier[c] = o->x[c][l];", "to->multiplier[c] = 0;", "multipliers start anew with each list"),
+    ]),
+    "src/solve/batch_residual.c": (SOLVE + ["scenes:walls_closing"], [
         ("on |= there & ((x > zero) | ~(open >= zero));", "on |= there & ~(open >= zero);",
          "contacts that push are not listed"),
         ("|| on[l] || moved[i + l];", "|| on[l];", "what has just come to 0 is not listed"),

@@ -6,6 +6,8 @@
 
 #include <stdint.h>
 
+#include "bergtow/base.h"
+
 enum { BT_LANES = 4 };
 
 typedef double bt_vec __attribute__((vector_size(BT_LANES * sizeof(double))));
@@ -28,5 +30,6 @@ BT_INLINE bt_vec bt_choose(bt_mask m, bt_vec yes, bt_vec no)
 BT_INLINE bt_vec bt_larger(bt_vec a, bt_vec b) { return bt_choose(a > b, a, b); }
 BT_INLINE bt_vec bt_smaller(bt_vec a, bt_vec b) { return bt_choose(a < b, a, b); }
 BT_INLINE bt_vec bt_size_of(bt_vec a) { return (bt_vec)((bt_mask)a & ~(bt_mask)(bt_vec){-0.0, -0.0, -0.0, -0.0}); }
+BT_INLINE double bt_largest_lane(bt_vec a) { return bt_max(bt_max(a[0], a[1]), bt_max(a[2], a[3])); }
 
 #endif

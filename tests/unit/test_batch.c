@@ -6,7 +6,7 @@
 
 #include "scene.h"
 
-#include "solve/batch.c"
+#include "solve/batch_layout.h"
 #include "solve/kernel.h"
 
 enum { BODIES = 60, CONTACTS = 230 };
@@ -352,7 +352,7 @@ static void each_listed_contact_is_in_one_batch(void **state)
         assert_false(seen[order[j]]);
         seen[order[j]] = true;
     }
-    assert_true(LANES * s.cell.work.n_batches < 1.15 * s.cell.work.n_list);
+    assert_true(BT_LANES * s.cell.work.n_batches < 1.15 * s.cell.work.n_list);
     // A visit ends when a pass has changed nothing that matters.
     done = 0;
     bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 5, INFINITY, &done, &most);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// What batches are made of (private to src/solve/batch*.c): the vectors of one, what stands after them, and what
+// outlives them.
+#ifndef BERGTOW_BATCH_LAYOUT_H
+#define BERGTOW_BATCH_LAYOUT_H
+
+#include "solve/batch.h"
+#include "solve/rows.h"
+
+/// Up to so many contacts, what a thread needs for a visit to a cell is on its stack: nearly all cells, which have some
+/// sixty.
+enum { BT_FEW = 128 };
+
+typedef enum { BT_BATCH_RIGID, BT_BATCH_BOUNDED, BT_BATCH_SHEETS, BT_BATCH_PROJECTION } bt_batch_kind;
+
+/// Names as in bt_contact and bt_mass; lanes without a contact are zero. It is all there is of its contacts while they
+/// are packed.
+typedef struct bt_batch {
+    bt_vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2];
+    bt_vec mu;              // friction; of the projection: the overlap that is left alone, m
+    bt_vec ma, ia, mb, ib;  // inverse masses and moments of inertia of a and b
+    bt_vec x[3], before[3]; // impulses, or multipliers: now, before the last sweep
+    bt_idx a[BT_LANES], b[BT_LANES], contact[BT_LANES], pair[BT_LANES];
+    bool moves_a[BT_LANES], moves_b[BT_LANES];
+    uint8_t points[BT_LANES], n, kind;
+} bt_batch;
+_Static_assert(sizeof(bt_batch) == 32 * sizeof(bt_vec), "the listed contacts of dense ice, 256 bytes each");
+
+/// Of the normals; [0] of sheets: the radius of their disc. After the batches of a cell whose contacts have bounds.
+typedef struct bt_batch_bounds {
+    bt_vec of[2];
+} bt_batch_bounds;
+
+/// Of one contact: unknowns before the last sweep, and the multipliers of the projection.
+typedef struct bt_unknowns {
+    double before[3], multiplier[2];
+    bt_idx contact;
+} bt_unknowns;
+
+/// The listed contacts of a cell into batches of sweeps, slop: NULL; or of the position projection, *slop: overlap that
+/// is left alone, m.
+void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop);
+
+#endif

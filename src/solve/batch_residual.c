@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+// Residual passes four contacts at a time: the same numbers and the same list as contact by contact (solver.c,
+// project.c), and which contacts the last sweep has moved.
+#include "solve/batch.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solve/batch_layout.h"
+#include "solve/kernel.h"
+#include "solve/rows.h"
+
+/// Which contacts the last sweep has moved, and their multipliers unless NULL; 0 of contacts that are in no batch.
+typedef struct {
+    uint8_t few_moved[BT_FEW], *moved;          // [n_contacts]
+    double few_x[BT_FEW][2], (*x)[2];           // [n_contacts]
+} last_sweep;
+
+static void take_last(const bt_cell *cell, bool projection, last_sweep *s)
+{
+    const size_t n = (size_t)cell->n_contacts;
+    const bool few = n <= BT_FEW;
+    s->moved = few ? s->few_moved : bt_realloc(NULL, n, sizeof *s->moved);
+    s->x = !projection ? NULL : few ? s->few_x : bt_realloc(NULL, n, sizeof *s->x);
+    if (n > 0) memset(s->moved, 0, n * sizeof *s->moved);
+    if (n > 0 && projection) memset(s->x, 0, n * sizeof *s->x);
+    for (bt_idx k = 0; k < cell->work.n_last; k++) {
+        const bt_unknowns *o = &cell->work.last[k];
+        const bt_idx i = o->contact;
+        const bt_contact *u = &cell->contacts[i];
+        const double *b = o->before;
+        if (projection) {
+            s->moved[i] = o->multiplier[0] != b[0] || o->multiplier[1] != b[1];
+            s->x[i][0] = o->multiplier[0], s->x[i][1] = o->multiplier[1];
+        } else {
+            s->moved[i] = u->ln[0] != b[0] || u->ln[1] != b[1] || u->lt != b[2];
+        }
+    }
+}
+
+static void free_last(last_sweep *s)
+{
+    if (s->moved != s->few_moved) free(s->moved);
+    if (s->x && s->x != s->few_x) free(s->x);
+}
+
+/// Lanes of a vector for loops over contacts.
+typedef struct {
+    double of[BT_LANES];
+} lanes;
+
+static inline lanes lanes_of(bt_vec a)
+{
+    lanes o;
+    memcpy(&o, &a, sizeof o);
+    return o;
+}
+
+/// The records of contacts i to i + 3 and their bodies; the last one again where there are no more.
+BT_INLINE void four_from(const bt_cell *cell, bt_idx i, const bt_contact *u[BT_LANES], bt_idx a[BT_LANES],
+                         bt_idx b[BT_LANES])
+{
+    for (int l = 0; l < BT_LANES; l++) {
+        u[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
+        a[l] = u[l]->a, b[l] = u[l]->b;
+    }
+}
+
+/// Lanes of contacts i to i + 3 that there are.
+BT_INLINE bt_mask there_are(const bt_cell *cell, bt_idx i)
+{
+    const int64_t left = cell->n_contacts - i;
+    return (bt_mask){0, 1, 2, 3} < (bt_mask){left, left, left, left};
+}
+
+BT_INLINE int64_t sum_of(bt_mask a) { return a[0] + a[1] + a[2] + a[3]; }
+
+BT_INLINE bt_vec limits_of(const bt_limit *const k[BT_LANES], int c)
+{
+    // of `most` and `flat` the lower one: nothing rises here
+    bt_vec most = {k[0]->most[c], k[1]->most[c], k[2]->most[c], k[3]->most[c]};
+    return bt_smaller(most, (bt_vec){k[0]->flat[c], k[1]->flat[c], k[2]->flat[c], k[3]->flat[c]});
+}
+
+/// As bt_contact_residual and the list of residual_in_place (solver.c).
+BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                            const uint8_t *moved, bool bounded)
+{
+    const double near = BT_NEAR * p->tolerance;
+    const bt_vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
+    const bt_limit *limits = cell->laws.limits;
+    bt_found f = {0};
+    bt_vec most = zero;
+    bt_mask rows = {0}, bad = {0};
+    for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
+        const bt_contact *u[BT_LANES];
+        bt_idx at_a[BT_LANES], at_b[BT_LANES];
+        four_from(cell, i, u, at_a, at_b);
+        const bt_four_rows r = bt_rows_of(u);
+        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
+        const bt_motions a = bt_take_four(v, at_a), b = bt_take_four(v, at_b);
+        const bt_limit *k[BT_LANES];
+        for (int l = 0; bounded && l < BT_LANES; l++) k[l] = &limits[u[l] - cell->contacts];
+        const bt_vec dx = b.x - a.x, dy = b.y - a.y, un = r.nx * dx + r.ny * dy;
+        bt_vec worst = zero, square[3], total = zero;
+        bt_mask on = (r.ln[0] + r.ln[1] > zero) | (r.lt != zero);
+        for (int c = 0; c < 2; c++) {
+            const bt_mask there = c ? r.two : r.one;
+            const bt_vec w = un + r.rbn[c] * b.w - r.ran[c] * a.w + r.bias[c];
+            bt_vec map;
+            if (bounded) {
+                const bt_vec to = w - m.w[c] * r.ln[c];
+                map = bt_larger(zero, bt_smaller(-to * m.mn[c], limits_of(k, c)));
+            } else {
+                map = bt_larger(zero, r.ln[c] - w * m.mn[c]);
+            }
+            const bt_vec e = bt_only(there, (map - r.ln[c]) * m.w[c]);
+            worst = bt_larger(worst, bt_size_of(e));
+            square[c] = e * e;
+            total += bt_only(there, r.ln[c]);
+            on |= there & ~(w >= zero);
+        }
+        const bt_vec wt = r.nx * dy - r.ny * dx + r.rbt * b.w - r.rat * a.w, bound = r.mu * total;
+        const bt_vec e = (bt_larger(-bound, bt_smaller(bound, r.lt - wt * m.mt)) - r.lt) * m.wt;
+        square[2] = e * e;
+        worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
+        const bt_mask counts = there_are(cell, i) & (bounded ? r.one : ~(bt_mask){0}); // sheets one by one
+        most = bt_larger(most, bt_only(counts, worst));
+        bad -= counts & (worst > near);
+        rows += counts & (1 - r.one - r.two);
+        const lanes normal = lanes_of(square[0]), second = lanes_of(square[1]), tangent = lanes_of(square[2]);
+        for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
+            bool listed = p->plain || on[l] || moved[i + l];
+            if (bounded && u[l]->n == 0) {
+                const bt_mass own = bt_mass_of(u[l], inv);
+                const double largest = bt_sheets_residual(u[l], &own, k[l], v, &f.squares);
+                listed = p->plain || u[l]->ln[0] + u[l]->ln[1] > 0 || u[l]->lt != 0 || moved[i + l] || largest > 0;
+                f.most = bt_max(f.most, largest);
+                f.bad += largest > near;
+                f.rows += 2;
+            } else {
+                f.squares += normal.of[l];
+                f.squares += second.of[l];
+                f.squares += tangent.of[l];
+            }
+            cell->work.list[cell->work.n_list] = i + l;
+            cell->work.n_list += listed;
+        }
+    }
+    f.most = bt_max(f.most, bt_largest_lane(most));
+    f.bad += sum_of(bad);
+    f.rows += sum_of(rows);
+    return f;
+}
+
+BT_FOR_EACH_CPU
+static bt_found residual_of_rigid(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                                  const uint8_t *moved)
+{
+    return residual(cell, v, inv, p, moved, false);
+}
+
+BT_FOR_EACH_CPU
+static bt_found residual_of_bounded(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+                                    const uint8_t *moved)
+{
+    return residual(cell, v, inv, p, moved, true);
+}
+
+bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p)
+{
+    last_sweep s;
+    take_last(cell, false, &s);
+    const bt_found f = cell->laws.limits ? residual_of_bounded(cell, v, inv, p, s.moved)
+                                         : residual_of_rigid(cell, v, inv, p, s.moved);
+    free_last(&s);
+    return f;
+}
+
+/// As residual_in_place of project.c.
+BT_FOR_EACH_CPU
+static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
+                                       const bt_problem *p, const last_sweep *s)
+{
+    const double near = BT_NEAR * p->tolerance;
+    const bt_vec zero = {0};
+    bt_found f = {0};
+    bt_vec most = zero;
+    bt_mask rows = {0}, bad = {0};
+    for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
+        const bt_contact *u[BT_LANES];
+        bt_idx at_a[BT_LANES], at_b[BT_LANES];
+        four_from(cell, i, u, at_a, at_b);
+        const bt_four_rows r = bt_rows_of(u);
+        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
+        const bt_motions a = bt_take_four(d, at_a), b = bt_take_four(d, at_b);
+        const bt_vec un = r.nx * (b.x - a.x) + r.ny * (b.y - a.y);
+        bt_vec worst = zero, square[2];
+        bt_mask on = {0};
+        for (int c = 0; c < 2; c++) {
+            const bt_mask there = c ? r.two : r.one;
+            bt_vec gap, x;
+            for (int l = 0; l < BT_LANES; l++) {
+                const bt_idx j = (bt_idx)(u[l] - cell->contacts);
+                gap[l] = cell->gaps[j].gap[c], x[l] = s->x[j][c];
+            }
+            const bt_vec open = un + r.rbn[c] * b.w - r.ran[c] * a.w + gap + slop;
+            const bt_vec e = bt_only(there, bt_size_of(bt_larger(zero, x - open * m.mn[c]) - x) * m.w[c]);
+            worst = bt_larger(worst, e);
+            square[c] = e * e;
+            on |= there & ((x > zero) | ~(open >= zero));
+        }
+        const bt_mask counts = there_are(cell, i);
+        most = bt_larger(most, bt_only(counts, worst));
+        bad -= counts & (worst > near);
+        rows += counts & (-r.one - r.two);
+        const lanes first = lanes_of(square[0]), second = lanes_of(square[1]);
+        for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
+            f.squares += first.of[l];
+            f.squares += second.of[l];
+            cell->work.list[cell->work.n_list] = i + l;
+            cell->work.n_list += on[l] || s->moved[i + l];
+        }
+    }
+    f.most = bt_max(f.most, bt_largest_lane(most));
+    f.bad += sum_of(bad);
+    f.rows += sum_of(rows);
+    return f;
+}
+
+bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
+                                      const bt_problem *p)
+{
+    last_sweep s;
+    take_last(cell, true, &s);
+    const bt_found f = residual_of_projection(cell, slop, d, inv, p, &s);
+    free_last(&s);
+    return f;
+}

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: MIT
+// Sweeps through the batches of a cell: the arithmetic of bt_update_contact (kernel.h) and of the position projection,
+// four contacts at a time, with the move of their unknowns before it.
+#include "solve/batch.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solve/batch_layout.h"
+#include "solve/rows.h"
+
+typedef bt_vec vec;
+typedef bt_mask mask;
+typedef bt_motions motion;
+
+BT_INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
+{
+    const uint32_t all = 0x01010101; // of nearly all batches
+    bt_transpose(&m);
+    if (memcmp(moves, &all, sizeof all) == 0) {
+        memcpy(&v[body[0]], &m.x, sizeof m.x);
+        memcpy(&v[body[1]], &m.y, sizeof m.y);
+        memcpy(&v[body[2]], &m.w, sizeof m.w);
+        memcpy(&v[body[3]], &m.unused, sizeof m.unused);
+        return;
+    }
+    if (moves[0]) memcpy(&v[body[0]], &m.x, sizeof m.x);
+    if (moves[1]) memcpy(&v[body[1]], &m.y, sizeof m.y);
+    if (moves[2]) memcpy(&v[body[2]], &m.w, sizeof m.w);
+    if (moves[3]) memcpy(&v[body[3]], &m.unused, sizeof m.unused);
+}
+
+/// As bt_solve_normals.
+BT_INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b, vec *l1, vec *l2)
+{
+    const vec zero = {0}, un = o->nx * (b->x - a->x) + o->ny * (b->y - a->y);
+    const vec u1 = un + o->rbn[0] * b->w - o->ran[0] * a->w + o->bias[0],
+              u2 = un + o->rbn[1] * b->w - o->ran[1] * a->w + o->bias[1];
+    const vec b1 = u1 - o->w[0] * o->x[0] - o->w12 * o->x[1], b2 = u2 - o->w12 * o->x[0] - o->w[1] * o->x[1];
+    const vec both1 = (o->w12 * b2 - o->w[1] * b1) * o->per_det, both2 = (o->w12 * b1 - o->w[0] * b2) * o->per_det;
+    const vec only1 = bt_larger(zero, -b1 * o->mn[0]), only2 = bt_larger(zero, -b2 * o->mn[1]);
+    const mask both = (o->per_det > zero) & (both1 >= zero) & (both2 >= zero),
+               first = (b2 + o->w12 * only1 >= zero) | (only2 == zero);
+    *l1 = bt_choose(both, both1, bt_choose(first, only1, zero));
+    *l2 = bt_choose(both, both2, bt_choose(first, zero, only2));
+}
+
+BT_INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
+
+/// As bt_limit_rim.
+BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[2])
+{
+    const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY}, half = {0.5, 0.5, 0.5, 0.5};
+    vec least = endless;
+    mask done = {0};
+    for (int side = 0; side < 4; side++) {
+        const int i = side >> 1, k = 1 - i;
+        vec x[2];
+        x[i] = side & 1 ? bound[i] : zero;
+        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
+        const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
+        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) +
+                          x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
+        const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless),
+                   take = open & (right | (value < least));
+        l[0] = bt_choose(take, x[0], l[0]);
+        l[1] = bt_choose(take, x[1], l[1]);
+        least = bt_choose(take, value, least);
+        done |= open & right;
+    }
+}
+
+/// As bt_limit_normals where no bound rises.
+BT_INLINE void bound_normals(const bt_batch *o, const vec bound[2], const motion *p, const motion *q, vec *l1, vec *l2)
+{
+    const mask over = (*l1 > bound[0]) | (*l2 > bound[1]);
+    if (!any_of(over)) return;
+    const vec zero = {0}, un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
+    vec b[2], l[2] = {*l1, *l2};
+    for (int i = 0; i < 2; i++)
+        b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
+    const vec alone = bt_larger(zero, bt_smaller(-b[0] * o->mn[0], bound[0]));
+    rim(o, bound, b, l);
+    const mask one = o->mn[1] == zero;
+    *l1 = bt_choose(over, bt_choose(one, alone, l[0]), *l1);
+    *l2 = bt_choose(over & ~one, l[1], *l2);
+}
+
+/// As bt_update_sheets; lanes without a contact have a disc of 0 and no step.
+BT_INLINE vec update_sheets(bt_batch *o, vec disc, bt_vel *v)
+{
+    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
+    const vec dvx = b.x - a.x, dvy = b.y - a.y;
+    vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
+    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
+    const vec square = x * x + y * y, one = {1, 1, 1, 1};
+    for (int l = 0; l < BT_LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
+    const vec scale = bt_choose(far > disc, disc / far, one);
+    x *= scale;
+    y *= scale;
+    const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
+    a.x -= o->ma * jx;
+    a.y -= o->ma * jy;
+    a.w -= o->ia * (dx * o->ran[0] + dy * o->rat);
+    b.x += o->mb * jx;
+    b.y += o->mb * jy;
+    b.w += o->ib * (dx * o->rbn[0] + dy * o->rbt);
+    o->x[0] = x, o->x[2] = y;
+    store(v, o->a, o->moves_a, a);
+    store(v, o->b, o->moves_b, b);
+    return bt_larger(bt_size_of(dx), bt_size_of(dy)) * o->wt;
+}
+
+/// As bt_update_contact, with bounds of the normals or NULL; the largest corrections, m/s.
+BT_INLINE vec update(bt_batch *o, const vec *limits, bt_vel *v)
+{
+    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
+    vec l1, l2;
+    solve_normals(o, &a, &b, &l1, &l2);
+    if (limits) bound_normals(o, limits, &a, &b, &l1, &l2);
+    const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
+    a.x -= o->ma * jx;
+    a.y -= o->ma * jy;
+    a.w -= o->ia * (d1 * o->ran[0] + d2 * o->ran[1]);
+    b.x += o->mb * jx;
+    b.y += o->mb * jy;
+    b.w += o->ib * (d1 * o->rbn[0] + d2 * o->rbn[1]);
+    const vec ut = o->nx * (b.y - a.y) - o->ny * (b.x - a.x) + o->rbt * b.w - o->rat * a.w, bound = o->mu * (l1 + l2);
+    const vec t = bt_larger(-bound, bt_smaller(bound, o->x[2] - ut * o->mt)), dt = t - o->x[2], tx = dt * o->ny,
+              ty = dt * o->nx;
+    a.x += o->ma * tx;
+    a.y -= o->ma * ty;
+    a.w -= o->ia * (dt * o->rat);
+    b.x -= o->mb * tx;
+    b.y += o->mb * ty;
+    b.w += o->ib * (dt * o->rbt);
+    o->x[0] = l1, o->x[1] = l2, o->x[2] = t;
+    store(v, o->a, o->moves_a, a);
+    store(v, o->b, o->moves_b, b);
+    return bt_larger(bt_larger(bt_size_of(d1) * o->w[0], bt_size_of(d2) * o->w[1]), bt_size_of(dt) * o->wt);
+}
+
+/// As the update of one contact in project.c: its points one after the other.
+BT_INLINE vec project(bt_batch *o, bt_vel *d)
+{
+    motion a = bt_take_four(d, o->a), b = bt_take_four(d, o->b);
+    const vec zero = {0};
+    vec most = zero;
+    for (int i = 0; i < 2; i++) {
+        const vec un = o->nx * (b.x - a.x) + o->ny * (b.y - a.y) + o->rbn[i] * b.w - o->ran[i] * a.w;
+        const vec open = un + o->bias[i] + o->mu, p = bt_larger(zero, o->x[i] - open * o->mn[i]), step = p - o->x[i];
+        const vec x = step * o->nx, y = step * o->ny;
+        a.x -= o->ma * x;
+        a.y -= o->ma * y;
+        a.w -= o->ia * (step * o->ran[i]);
+        b.x += o->mb * x;
+        b.y += o->mb * y;
+        b.w += o->ib * (step * o->rbn[i]);
+        o->x[i] = p;
+        most = bt_larger(most, bt_size_of(step) * o->w[i]);
+    }
+    store(d, o->a, o->moves_a, a);
+    store(d, o->b, o->moves_b, b);
+    return most;
+}
+
+BT_FOR_EACH_CPU
+static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
+{
+    vec most = {0};
+    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, update(&batch[k], NULL, v));
+    return bt_largest_lane(most);
+}
+
+BT_FOR_EACH_CPU
+static double pass_projection(bt_batch *batch, bt_idx n, bt_vel *d)
+{
+    vec most = {0};
+    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, project(&batch[k], d));
+    return bt_largest_lane(most);
+}
+
+/// The same where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
+BT_FOR_EACH_CPU
+static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
+{
+    vec most = {0};
+    for (bt_idx k = 0; k < n; k++) {
+        bt_batch *o = &batch[k];
+        const vec *limits = ((const bt_batch_bounds *)(batch + n))[k].of;
+        most = bt_larger(most, o->kind == BT_BATCH_SHEETS ? update_sheets(o, limits[0], v) : update(o, limits, v));
+    }
+    return bt_largest_lane(most);
+}
+
+/// Unknowns of a batch after their move: of one visit to a cell.
+typedef struct {
+    vec x[3];
+} moved;
+
+BT_INLINE void move_unknowns(bt_batch *batch, bt_idx n, int unknowns, double beta, moved *y)
+{
+    for (bt_idx k = 0; k < n; k++) {
+        bt_batch *o = &batch[k];
+        for (int c = 0; c < unknowns; c++) {
+            const vec now = o->x[c];
+            if (beta > 0) o->x[c] = now + beta * (now - o->before[c]);
+            o->before[c] = now;
+            y[k].x[c] = o->x[c];
+        }
+    }
+}
+
+BT_INLINE double sum_against(const bt_batch *batch, bt_idx n, int unknowns, const moved *y)
+{
+    vec sum = {0};
+    for (bt_idx k = 0; k < n; k++) {
+        const bt_batch *o = &batch[k];
+        for (int c = 0; c < unknowns; c++)
+            sum += (c < 2 ? o->w[c] : o->wt) * (y[k].x[c] - o->x[c]) * (o->x[c] - o->before[c]);
+    }
+    return sum[0] + sum[1] + sum[2] + sum[3];
+}
+
+BT_FOR_EACH_CPU
+static void move(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 3, beta, y); }
+
+BT_FOR_EACH_CPU
+static double against(const bt_batch *batch, bt_idx n, const moved *y) { return sum_against(batch, n, 3, y); }
+
+BT_FOR_EACH_CPU
+static void move_projection(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 2, beta, y); }
+
+BT_FOR_EACH_CPU
+static double against_projection(const bt_batch *batch, bt_idx n, const moved *y)
+{
+    return sum_against(batch, n, 2, y);
+}
+
+typedef double pass_of_batches(bt_batch *batch, bt_idx n, bt_vel *v);
+
+static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sweep *s, int times, double enough,
+                    int64_t *done, double *most)
+{
+    bt_batch *batch = cell->work.batch;
+    const bt_idx n_batches = cell->work.n_batches;
+    moved few[BT_FEW / BT_LANES], *y = few;
+    if (s->moves && n_batches > BT_FEW / BT_LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
+    const bool projection = once == pass_projection;
+    if (s->moves) (projection ? move_projection : move)(batch, n_batches, s->beta, y);
+    double last = INFINITY;
+    for (int n = 0; n == 0 || (n < times && last > enough); n++) {
+        last = once(batch, n_batches, v);
+        if (n == 0) *most = last;
+        *done += cell->work.n_list;
+    }
+    const double turned = !s->moves ? 0 : (projection ? against_projection : against)(batch, n_batches, y);
+    if (y != few) free(y);
+    return turned;
+}
+
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+                      int64_t *done, double *most)
+{
+    if (!cell->work.packed) bt_batch_pack(cell, inv, NULL);
+    return visit(cell, v, cell->laws.limits ? pass_bounded : pass, s, times, enough, done, most);
+}
+
+double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+                        double *most)
+{
+    if (!cell->work.packed) bt_batch_pack(cell, inv, &slop);
+    return visit(cell, d, pass_projection, s, 1, 0, done, most);
+}
