@@ -9,7 +9,7 @@ import re
 import subprocess
 from functools import lru_cache
 
-from bergtow_read import RunError
+from bergtow_read import USAGE, RunError
 
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 BARE = {"rad": "deg", "rad/s": "deg/s"}  # unit of a number without one, where that is not SI
@@ -31,4 +31,4 @@ def number(binary, what, text, si):
         up, down = table(binary).get((symbol, si), (1, 1))
         return float(match[1]) * up / down
     raise RunError(f"{what} {text}", f"is no number{f' of {si}' if si else ''}",
-                   f"give a number{' with one of the units ' + ', '.join(known) if si else ''}")
+                   f"give a number{' with one of the units ' + ', '.join(known) if si else ''}", USAGE)

@@ -194,7 +194,7 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
                          (("--speed", "0 m/s"), "--speed 0 m/s: is not above 0"),
                          (("--speed", "3 m"), "--speed 3 m: is no number of m/s")):
         done = said(*words)
-        assert done.returncode == 4 and wrong in done.stderr, done.stderr
+        assert done.returncode == 2 and wrong in done.stderr, done.stderr
     done = said("--search", "ice.size", "--from", "0.4 m", "--to", "0.8 m", "--resolution", "5 cm", "--speed", "0.1 kn")
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "out/capability.json").read_text())
