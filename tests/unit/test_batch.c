@@ -25,7 +25,7 @@ typedef struct {
 
 static double any(uint64_t *rng) { return 2 * scene_uniform(rng) - 1; }
 
-/// Of those with two points some have them in one place.
+/// Of those with two points some have them in one place, or all but: then their two rows are one, but for rounding.
 static bt_contact random_contact(uint64_t *rng, const bt_inv *inv)
 {
     bt_contact u = {.n = 1 + (scene_uniform(rng) < 0.6), .mu = 0.5 * scene_uniform(rng)};
@@ -42,7 +42,11 @@ static bt_contact random_contact(uint64_t *rng, const bt_inv *inv)
         u.ln[i] = bt_max(0, any(rng));
     }
     u.lt = any(rng) * u.mu * (u.ln[0] + u.ln[1]);
-    if (scene_uniform(rng) < 0.1) u.ran[1] = u.ran[0], u.rbn[1] = u.rbn[0];
+    if (scene_uniform(rng) < 0.2) {
+        const double apart = scene_uniform(rng) < 0.3 ? 0 : 1e-15;
+        u.ran[1] = u.ran[0] + apart, u.rbn[1] = u.rbn[0] + apart;
+        if (u.n > 1) u.bias[1] = u.bias[0]; // then both may press
+    }
     return u;
 }
 
