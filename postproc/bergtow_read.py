@@ -31,8 +31,8 @@ def within(time, start, end):
     return there
 
 
-#: exit codes besides 4, input or output: of what was asked for, of the case, of a limit of time
-USAGE, BAD_CASE, LIMIT = 2, 3, 6
+#: exit codes, by the names of the library: of what was asked for, of the case, of a signal or a limit
+USAGE, CASE, SIGNAL = 2, 3, 6
 
 
 class RunError(Exception):

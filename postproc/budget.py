@@ -18,7 +18,7 @@ import findings
 import loads
 import stat_budget
 import stat_load
-from bergtow_read import BAD_CASE, LIMIT, USAGE, RunError
+from bergtow_read import CASE, SIGNAL, USAGE, RunError
 from case_runs import program, run_members
 from ensemble_read import FAILED, FINISHED, WAITING, Ensemble, listed
 from text_table import hours_text
@@ -134,10 +134,10 @@ def of_ensemble(e, of=OF[0], computed=None):
     intervals. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
-                       BAD_CASE)
+                       CASE)
     if "fields: common" in e.study:
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
-                       BAD_CASE)
+                       CASE)
     meaning, done, values = numbers(e, of)
     sample = fair(e)
     there = np.isin(done, sample)
@@ -147,7 +147,7 @@ def of_ensemble(e, of=OF[0], computed=None):
                                computed if of == OF[0] else None)
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further",
-                       LIMIT)
+                       SIGNAL)
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
     if lacking or np.any(e.status[sample] == FAILED):
         found = without_intervals(found)

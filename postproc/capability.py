@@ -28,7 +28,7 @@ import domain_width
 import findings
 import stat_mean
 import units
-from bergtow_read import BAD_CASE, USAGE, Run, RunError, case_value, parse_case, within
+from bergtow_read import CASE, USAGE, Run, RunError, case_value, parse_case, within
 from case_file import files, section
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 
@@ -79,10 +79,10 @@ def kept(run, least):
 def trial(run, number, least):
     """Of a run that is there. Errors: RunError."""
     if run.window is None:
-        raise RunError(run.path, "the run has no window", "make run.duration longer", BAD_CASE)
+        raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
-                       BAD_CASE)
+                       CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
     # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted
@@ -281,11 +281,11 @@ def check(case, key):
     if mode != "thrust" and not (mode == "line" and load > 0):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
-                       "tow.line.breaking_load", BAD_CASE)
+                       "tow.line.breaking_load", CASE)
     if domain_width.read_ice_of(case):
         raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
                        "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
-                       "each value", BAD_CASE)
+                       "each value", CASE)
     if key == "ice.seed":
         raise RunError(key, "the fields are its values already", "search another key", USAGE)
 

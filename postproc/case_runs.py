@@ -27,7 +27,7 @@ from pathlib import Path
 
 from bergtow._calls import Calls
 from bergtow._interrupts import held
-from bergtow_read import BAD_CASE, USAGE, Refused, Run, RunError
+from bergtow_read import CASE, USAGE, Refused, Run, RunError
 from case_file import files
 
 import numpy as np
@@ -222,7 +222,7 @@ class CaseRuns:
         if first is not None and first == second:
             raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or "
                            "given floe by floe, and no seed changes it", "let the program make the ice, by removing "
-                           "ice.outlines, ice.field or floes", BAD_CASE)
+                           "ice.outlines, ice.field or floes", CASE)
 
     def there(self, name, n, values):
         """Are n runs there now, or could they be made? False where the budget does not reach so far."""

@@ -29,7 +29,7 @@ from pathlib import Path
 import command
 import findings
 import stat_mean
-from bergtow_read import LIMIT, USAGE, Run, RunError, within
+from bergtow_read import SIGNAL, USAGE, Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
 from report_case import BESIDE, annotated
 
@@ -273,7 +273,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
-                       "raise --budget; what was begun is kept, and the same call goes on", LIMIT)
+                       "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         rows += window(study, margin)

@@ -28,7 +28,7 @@ import domain_width
 import findings
 import pdf
 import report
-from bergtow_read import LIMIT, Run, RunError
+from bergtow_read import SIGNAL, Run, RunError
 from case_file import contents, files, is_study, says, section
 from case_runs import above_zero, checked, program, run_members
 from domain_width import read_ice_of, reads_ice
@@ -152,7 +152,7 @@ def run_case(work, a, case):
     whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_done(Ensemble(a.output)) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
-                       "raise --budget; what was begun is kept, and the same call goes on", LIMIT)
+                       "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
     rate = seconds_a_field(Ensemble(a.output)) / work.jobs
     replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Ensemble(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")

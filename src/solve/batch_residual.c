@@ -57,14 +57,27 @@ static inline lanes lanes_of(bt_vec a)
     return o;
 }
 
-/// The records of contacts i to i + 3 and their bodies; the last one again where there are no more.
-BT_INLINE void four_from(const bt_cell *cell, bt_idx i, const bt_contact *u[BT_LANES], bt_idx a[BT_LANES],
-                         bt_idx b[BT_LANES])
+/// Contacts i to i + 3 with their masses, and what their bodies move by (velocities, or displacements).
+typedef struct {
+    const bt_contact *u[BT_LANES];
+    bt_four_rows r;
+    bt_masses m;
+    bt_motions a, b;
+} four;
+
+/// The last contact of the cell again where there are no more.
+BT_INLINE four four_from(const bt_cell *cell, bt_idx i, const bt_vel *v, const bt_inv *inv)
 {
+    four o;
+    bt_idx a[BT_LANES], b[BT_LANES];
     for (int l = 0; l < BT_LANES; l++) {
-        u[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
-        a[l] = u[l]->a, b[l] = u[l]->b;
+        o.u[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
+        a[l] = o.u[l]->a, b[l] = o.u[l]->b;
     }
+    o.r = bt_rows_of(o.u);
+    o.m = bt_masses_of(&o.r, bt_take_inv(inv, a), bt_take_inv(inv, b));
+    o.a = bt_take_four(v, a), o.b = bt_take_four(v, b);
+    return o;
 }
 
 /// Lanes of contacts i to i + 3 that there are.
@@ -94,12 +107,11 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
     bt_vec most = zero;
     bt_mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
-        const bt_contact *u[BT_LANES];
-        bt_idx at_a[BT_LANES], at_b[BT_LANES];
-        four_from(cell, i, u, at_a, at_b);
-        const bt_four_rows r = bt_rows_of(u);
-        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
-        const bt_motions a = bt_take_four(v, at_a), b = bt_take_four(v, at_b);
+        const four o = four_from(cell, i, v, inv);
+        const bt_contact *const *u = o.u;
+        const bt_four_rows r = o.r;
+        const bt_masses m = o.m;
+        const bt_motions a = o.a, b = o.b;
         const bt_limit *k[BT_LANES];
         for (int l = 0; bounded && l < BT_LANES; l++) k[l] = &limits[u[l] - cell->contacts];
         const bt_vec dx = b.x - a.x, dy = b.y - a.y, un = r.nx * dx + r.ny * dy;
@@ -189,12 +201,11 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
     bt_vec most = zero;
     bt_mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
-        const bt_contact *u[BT_LANES];
-        bt_idx at_a[BT_LANES], at_b[BT_LANES];
-        four_from(cell, i, u, at_a, at_b);
-        const bt_four_rows r = bt_rows_of(u);
-        const bt_masses m = bt_masses_of(&r, bt_take_inv(inv, at_a), bt_take_inv(inv, at_b));
-        const bt_motions a = bt_take_four(d, at_a), b = bt_take_four(d, at_b);
+        const four o = four_from(cell, i, d, inv);
+        const bt_contact *const *u = o.u;
+        const bt_four_rows r = o.r;
+        const bt_masses m = o.m;
+        const bt_motions a = o.a, b = o.b;
         const bt_vec un = r.nx * (b.x - a.x) + r.ny * (b.y - a.y);
         bt_vec worst = zero, square[2];
         bt_mask on = {0};

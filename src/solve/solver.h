@@ -59,7 +59,7 @@ typedef struct bt_solver {
     bt_idx cap_bodies;
     bool shifted;                ///< the projection, or its second pass, has moved something
     bool turned;                 ///< some pair has turned so far that there may be a second pass
-    bt_kept_rows *kept;            ///< [n_kept] in any order
+    bt_kept_rows *kept;          ///< [n_kept] in any order
     bt_idx n_kept, cap_kept;
     bool rebounds;               ///< some contact of this step has a restitution
     struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)

@@ -20,8 +20,8 @@
 #include "space/phases.h"
 
 /// Move body i by its velocity over dt, and by its displacement; returns the length of its path through the water's
-/// frame, m. Displacements of the projection are there
-/// only for cells that contacts may move: for others their array still holds what it held, maybe of other bodies.
+/// frame, m. Displacements of the projection are there only for cells that contacts may move: for others their array
+/// still holds what it held, maybe of other bodies.
 static double move(bt_world *w, bt_idx i, double dt, bool shifted)
 {
     bt_bodies *b = &w->bodies;
