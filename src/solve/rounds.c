@@ -52,11 +52,7 @@ void bt_rounds_list(bt_cell *cell)
 void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 {
     bt_work_list *k = &cell->work;
-    if (cell->n_contacts > k->cap_in_place) {
-        k->cap_in_place = bt_cells_room(cell->n_contacts);
-        free(k->in_place);
-        k->in_place = bt_alloc_aligned((size_t)k->cap_in_place, sizeof *k->in_place);
-    }
+    k->in_place = bt_cells_after_contacts(cell, (size_t)cell->n_contacts * sizeof *k->in_place);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
         k->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
 }

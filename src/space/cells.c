@@ -18,10 +18,9 @@ bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 static void free_work(bt_work_list *k)
 {
     free(k->list);
-    free(k->in_place);
     k->list = NULL;
     k->in_place = NULL;
-    k->n_list = k->cap_list = k->cap_in_place = k->n_last = 0;
+    k->n_list = k->cap_list = k->n_last = 0;
 }
 
 void bt_cells_make_room(bt_cell *t, size_t bytes)
@@ -32,18 +31,30 @@ void bt_cells_make_room(bt_cell *t, size_t bytes)
     t->contacts = bt_alloc_aligned(t->contact_bytes, 1);
 }
 
+/// The contacts into memory of their own.
+static void move_contacts(bt_cell *t, size_t bytes)
+{
+    bt_contact *contacts = bt_alloc_aligned(bytes, 1);
+    if (t->n_contacts > 0) memcpy(contacts, t->contacts, (size_t)t->n_contacts * sizeof *contacts);
+    free(t->contacts);
+    t->contacts = contacts;
+    t->contact_bytes = bytes;
+}
+
+void *bt_cells_after_contacts(bt_cell *t, size_t bytes)
+{
+    const size_t own = (size_t)t->n_contacts * sizeof *t->contacts;
+    if (own + bytes > t->contact_bytes) move_contacts(t, own + bytes + (own + bytes) / 32);
+    return (char *)t->contacts + own;
+}
+
 /// Only the contacts stay.
 static void rest(bt_cell *t)
 {
     assert(!t->work.packed);
     free_work(&t->work);
     const size_t bytes = (size_t)t->n_contacts * sizeof *t->contacts;
-    if (t->contact_bytes - t->contact_bytes / 8 <= bytes) return;
-    bt_contact *contacts = bt_alloc_aligned(bytes, 1);
-    if (bytes > 0) memcpy(contacts, t->contacts, bytes);
-    free(t->contacts);
-    t->contacts = contacts;
-    t->contact_bytes = bytes;
+    if (t->contact_bytes - t->contact_bytes / 8 > bytes) move_contacts(t, bytes);
 }
 
 void bt_cells_rest(bt_cells *t)

@@ -120,9 +120,8 @@ typedef struct bt_work_list {
     bt_idx *list;                   ///< [n_list] ascending
     double (*best)[3];              ///< [n_contacts] of the best residual pass, while they are kept; otherwise NULL
     bt_idx n_list, cap_list;
-    /// [n_contacts] of a cell whose contacts are swept where they are, otherwise NULL (solve/rounds.h)
+    /// [n_contacts] of a cell whose contacts are swept where they are, after them (solve/rounds.h); otherwise unset
     struct bt_in_place *in_place;
-    bt_idx cap_in_place;
     /// The listed contacts are in batches (solve/batch.h), and the cell has no contacts but those. In the memory of the
     /// contacts: [n_batches], and after them the records of the contacts that are not listed
     bool packed;
@@ -241,6 +240,9 @@ void bt_cells_leave(bt_cells *t);
 
 /// Room for so many bytes where the contacts are; what was there is lost when there was less.
 void bt_cells_make_room(bt_cell *t, size_t bytes);
+
+/// Room for so many bytes after the contacts, which stay but may be moved; returns where it begins.
+void *bt_cells_after_contacts(bt_cell *t, size_t bytes);
 
 /// Give back what sweeps take anew in the next step.
 void bt_cells_rest(bt_cells *t);
