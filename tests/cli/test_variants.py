@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Variants of a study against its first one: the change of the mean, its interval, and the picture."""
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 import yaml
 
+import made_up_ensemble
 from harness import ROOT, call, write_case
 
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -71,3 +73,41 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
         assert changes[1][2] > 20, "twice the mass of ice loads the body more"
     plot_ensemble.main([str(tmp_path / "out")])
     assert (tmp_path / "out/variants.png").stat().st_size > 10000
+
+
+def changes(*folders, cwd):
+    return subprocess.run([sys.executable, str(ROOT / "cases/studies/changes.py"), *folders], cwd=cwd, text=True,
+                          capture_output=True)
+
+
+def made_up(folder, factor, fields=3, missing=False):
+    """Fields of two conditions, whose means are `factor` times (1, 2, 3) kN and (10, 20, 30) kN."""
+    members = [made_up_ensemble.member([1000 * factor * (k + 1) * (10 if c else 1)] * 40,
+                                       {"ice.concentration": 0.8 if c else 0.5}, c,
+                                       summary={"peak_ice_resistance_n": 5000.0 * (k + 1), "n_steps": 40,
+                                                "max_overlap_relative": 0.001 * (k + 1)},
+                                       status=made_up_ensemble.WAITING if missing and c and k < 2 else
+                                       made_up_ensemble.FINISHED)
+               for c in (0, 1) for k in range(fields)]
+    made_up_ensemble.write(folder, members)
+
+
+def test_a_study_with_a_key_replaced_is_compared_field_by_field(tmp_path):
+    made_up(tmp_path / "base", 1)
+    made_up(tmp_path / "half", 0.5)
+    made_up(tmp_path / "begun", 2, missing=True)
+    made_up(tmp_path / "more", 1, fields=4)
+    result = changes("base", "smooth=half", "begun", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert "| concentration 50 % | 2 ± 0.58 | 1 ± 0.29 | 4 ± 1.2 |" in lines
+    assert "| concentration 80 % | 20 ± 5.8 | 10 ± 2.9 | 60 ± – |" in lines
+    assert "| concentration 50 % | -50 (-50 to -50) | +100 (+100 to +100) |" in lines
+    assert "| concentration 80 % | -50 (-50 to -50) | – |" in lines
+    assert "| concentration 80 % | 15.0 | 15.0 | 15.0 |" in lines
+    assert "begun: 4 of 6 fields, 0 of 160 steps not converged, overlap at most 0.3 % of a floe, but for rafting" in lines
+    assert (tmp_path / "changes.png").stat().st_size > 10000
+    other = changes("base", "more", cwd=tmp_path)
+    assert other.returncode == 4 and "has other fields than the first" in other.stderr
+    assert changes("base", "nowhere", cwd=tmp_path).returncode == 4
+    assert changes("base", "half", "-o", "x.txt", cwd=tmp_path).returncode == 2

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""What a change of its base case does to each condition of a study, field by field.
+
+    changes.py BASE OTHER [OTHER ...] [-o changes.png]
+
+Each is the folder of an ensemble, as "NAME=FOLDER" or a folder that lends its name; the others are the same study with
+keys replaced (`bergtow ensemble STUDY -s KEY=VALUE -o FOLDER`), so that their fields are those of the first. Printed as
+tables: mean ± standard error over the fields; change of the mean with its 95 % interval, of the ratio of the means
+field by field; the largest mean over a step in any field; and how sound the runs were. Members that have not finished,
+or have no mean, are left out, and counted.
+"""
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import command  # noqa: E402
+import style  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
+from ensemble_read import Ensemble, reading, short_key, worded  # noqa: E402
+from plot_variants import relative_change  # noqa: E402
+from stat_mean import t_interval  # noqa: E402
+
+import matplotlib.pyplot as plt  # noqa: E402
+
+LINES = ((style.INK, "-"), (style.ICE, "-"), (style.ICE, "--"), (style.TOW, "-"), (style.TOW, "--"), (style.DRAG, "-"),
+         (style.INERTIA, "-"), (style.CORIOLIS, "-"))
+
+
+def named(text):
+    """(name, ensemble) of NAME=FOLDER or FOLDER."""
+    name, given, folder = text.rpartition("=")
+    return (name if given else Path(folder).name), Ensemble(folder)
+
+
+def fields(e, c):
+    """{repeat: mean of that field, N}."""
+    return dict(zip(e.repeat[c.finished].tolist(), e.mean[c.finished]))
+
+
+def must_match(base, e):
+    """Refuse another study, or the same with other fields."""
+    if [c.values for c in base.conditions()] != [c.values for c in e.conditions()]:
+        raise RunError(e.path, "has other conditions than the first", "give the same study with keys replaced")
+    pairs = zip(base.conditions(), e.conditions())
+    seeds = [[dict(zip(x.repeat[c.members].tolist(), x.seed[c.members].tolist())) for x, c in zip((base, e), pair)]
+             for pair in pairs]
+    if any(a.get(r, s) != s for a, b in seeds for r, s in b.items()):
+        raise RunError(e.path, "has other fields than the first", "make it of the same study file, with the same seed")
+
+
+def mean_and_errors(means):
+    """Mean, its standard error, half width of its 95 % interval."""
+    x = np.array(list(means.values()))
+    if len(x) < 2:
+        return (x.mean() if len(x) else np.nan), np.nan, np.nan
+    low, high = t_interval(x)
+    return x.mean(), x.std(ddof=1) / np.sqrt(len(x)), (high - low) / 2
+
+
+def rows(base, e):
+    """Of each condition: mean and its standard error, N; change of the mean and half width of its interval, %; half
+    width of the interval of the mean, N."""
+    out = []
+    for b, c in zip(base.conditions(), e.conditions()):
+        means = fields(e, c)
+        mean, error, half = mean_and_errors(means)
+        out.append((mean, error, *relative_change(means, fields(base, b), True), half))
+    return np.array(out)
+
+
+def label(c):
+    """A condition without what follows from its first key."""
+    key, value = next(iter(c.values.items()))
+    return worded(key, value, c.units[key])
+
+
+def table(head, lines):
+    print("| " + " | ".join(head) + " |\n|" + " --- |" + " ---: |" * (len(head) - 1))
+    for line in lines:
+        print("| " + " | ".join(line) + " |")
+    print()
+
+
+def report(studies):
+    base = studies[0][1]
+    factor, unit = style.scale([m for _, e in studies for m in rows(base, e)[:, 0]], "N")
+    names, labels = [name for name, _ in studies], [label(c) for c in base.conditions()]
+    of = [rows(base, e) for _, e in studies]
+
+    def number(x, text):
+        return text.replace("nan", "–") if np.isfinite(x) else "–"
+
+    print(f"mean ± standard error over the fields, {unit}\n")
+    table(["", *names], [[words, *(number(r[k, 0], f"{r[k, 0] / factor:.3g} ± {r[k, 1] / factor:.2g}") for r in of)]
+                         for k, words in enumerate(labels)])
+    print("change of the mean, % (95 %)\n")
+    table(["", *names[1:]], [[words, *(number(c[k], f"{c[k]:+.0f} ({c[k] - h[k]:+.0f} to {c[k] + h[k]:+.0f})")
+                                       for c, h in (r[:, 2:4].T for r in of[1:]))]
+                             for k, words in enumerate(labels)])
+    print(f"largest mean over a step in any field, {unit}\n")
+    peaks = [[np.max(e.summary["peak_ice_resistance_n"][c.finished], initial=-np.inf) / factor for c in e.conditions()]
+             for _, e in studies]
+    table(["", *names], [[words, *(number(p[k], style.short(p[k])) for p in peaks)] for k, words in enumerate(labels)])
+    for name, e in studies:
+        print(f"{name}: {soundness_of(e)}")
+
+
+def soundness_of(e):
+    used = np.concatenate([c.finished for c in e.conditions()])
+    if not len(used):
+        return "no field has finished"
+    missed, steps = (np.nansum(e.summary[key][used]) for key in ("unconverged_steps", "n_steps"))
+    return (f"{len(used)} of {e.n} fields, {missed:.0f} of {steps:.0f} steps not converged, overlap at most "
+            f"{100 * np.nanmax(e.summary['max_overlap_relative'][used]):.1f} % of a floe, but for rafting")
+
+
+def draw(studies):
+    """Means and their changes over the first key that was varied."""
+    base = studies[0][1]
+    key = next(iter(base.conditions()[0].values))
+    scale, unit_of_key = reading(key, base.units[key])
+    x = scale * np.array([c.values[key] for c in base.conditions()])
+    figure, (above, below) = plt.subplots(2, 1, figsize=(8.4, 8.2), sharex=True, height_ratios=(3, 2))
+    figure.subplots_adjust(left=0.11, right=0.97, top=0.9, bottom=0.08, hspace=0.08)
+    of = [rows(base, e) for _, e in studies]
+    factor, unit = style.scale(np.concatenate([r[:, 0] for r in of]), "N")
+    shift = 0.004 * np.ptp(x) * (np.arange(len(studies)) - (len(studies) - 1) / 2)
+    for (name, _), r, (colour, dashes), dx in zip(studies, of, LINES, shift):
+        above.errorbar(x + dx, r[:, 0] / factor, r[:, 4] / factor, color=colour, linestyle=dashes, marker="o",
+                       markersize=3.5, linewidth=1.4, capsize=2, label=name)
+        if r is not of[0]:
+            below.errorbar(x + dx, r[:, 2], r[:, 3], color=colour, linestyle=dashes, marker="o", markersize=3.5,
+                           linewidth=1.4, capsize=2)
+    above.set_yscale("log")
+    style.logarithmic(above.yaxis)
+    above.set_ylabel(f"mean ice resistance, {unit}")
+    above.legend(frameon=False, fontsize=9)
+    below.axhline(0, color=style.INK, linewidth=0.8)
+    below.set_ylabel("change of the mean, %")
+    below.set_xlabel(f"{short_key(key)}, {unit_of_key}".rstrip(", "))
+    figure.text(0.11, 0.955, base.title, fontsize=12)
+    figure.text(0.11, 0.925, f"the same fields with one value changed; against \"{studies[0][0]}\"; bars: 95 %",
+                fontsize=9, color=style.FAINT)
+    return figure
+
+
+def main():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("base", metavar="BASE")
+    p.add_argument("others", metavar="OTHER", nargs="+")
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("changes.png"))
+    command.add_force(p)
+    a = p.parse_args()
+    if a.output.suffix.lower() not in command.PICTURES:
+        p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(command.PICTURES)}")
+    command.may_write(a.output, a.force)
+    studies = [named(text) for text in (a.base, *a.others)]
+    if len(studies) > len(LINES):
+        p.error(f"at most {len(LINES)} studies")
+    for _, e in studies[1:]:
+        must_match(studies[0][1], e)
+    report(studies)
+    command.save(draw(studies), a.output, a.force)
+
+
+if __name__ == "__main__":
+    command.guarded(main)
