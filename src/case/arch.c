@@ -20,8 +20,8 @@ static bool reaches(double concentration, double limit) { return concentration >
 /// A pair of boundaries of the domain that may stand beside a tow, what lies between them, and its key.
 typedef struct pair {
     bt_bound kind;
-    double extent;     ///< m
-    const char *key, *open;
+    double extent, ice; ///< of the domain, and of the region of the ice, m
+    const char *key, *region, *open;
 } pair;
 
 /// Body widths, and those that are needed, between one pair for a tow in the direction `course`.
@@ -40,6 +40,9 @@ static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double
                  .needed = NAN};
     a.sides = open ? p->open : p->kind == BT_BOUND_WALL ? "walls" : "periodic images";
     a.beside = n > 0 && floe_size > 0;
+    a.region = p->region;
+    const double water = p->extent - p->ice;
+    a.water = a.beside && concentration > 0 && c->tow.mode != BT_TOW_NONE && water > BT_ARCH_WATER * floe_size ? water : 0;
     for (size_t k = 0; a.beside && !open && k < sizeof asked / sizeof *asked; k++)
         if (reaches(concentration, asked[k].concentration)) a.needed = asked[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
@@ -61,8 +64,10 @@ static bool narrower(const bt_arch *a, const bt_arch *b)
 bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
 {
     // along x: beside a tow along y
-    const pair pairs[2] = {{c->domain.sides, c->domain.width, "domain.width", "open sides"},
-                           {c->domain.ends, c->domain.length, "domain.length", "open ends"}};
+    const pair pairs[2] = {{c->domain.sides, c->domain.width, c->ice.y_max - c->ice.y_min, "domain.width",
+                            "ice.y_min, ice.y_max", "open sides"},
+                           {c->domain.ends, c->domain.length, c->ice.x_max - c->ice.x_min, "domain.length",
+                            "ice.x_min, ice.x_max", "open ends"}};
     const int legs = c->tow.n_waypoints > 0 ? c->tow.n_waypoints : 1;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
     double begins = 0; // way at which the leg begins, m: straight from the body on, corners not rounded
@@ -93,6 +98,12 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
                       a->key, a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->needed);
+    if (a->water > 0)
+        bt_errors_add(warnings,
+                      "%s: %.4g m of open water beside the tow, where the ice ends before the domain does: floes are "
+                      "pushed out into it, and the resistance is that of a strip of ice; leave both keys out to fill "
+                      "the domain, unless that is meant",
+                      a->region, a->water);
     if (a->unbounded)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "

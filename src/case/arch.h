@@ -32,6 +32,9 @@
 /// that is narrower for its ice counts; of way-points, the leg for which that is.
 #define BT_ARCH_ALONG 0.9
 
+/// Open water beside the ice that is not worth a word, in mean floe sizes, assumed.
+#define BT_ARCH_WATER 2
+
 typedef struct bt_arch {
     const char *key;      ///< "domain.width", or "domain.length" where the tow goes along y
     double concentration; ///< as given
@@ -39,6 +42,8 @@ typedef struct bt_arch {
     double floes;         ///< the same in mean floe sizes; NaN without floes
     double needed;        ///< body widths of a domain that is not expected to show; NaN where nothing holds the ice at
                           ///< the sides, or it is too loose to matter
+    const char *region;   ///< keys of the ends of the ice across the tow
+    double water;         ///< open water beside the ice across the tow, m; 0 = none worth a word
     bool beside;          ///< there is a body, and ice beside it
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush
@@ -52,7 +57,8 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size);
 /// "rigid floes" or "floes": of what the arches are.
 const char *bt_arch_floes(const bt_arch *a);
 
-/// Warn of a width of which the answer is a property, and of a load without an upper bound.
+/// Warn of a width of which the answer is a property, of ice that ends beside the tow, and of a load without an upper
+/// bound.
 void bt_arch_warn(const bt_arch *a, bt_errors *warnings);
 
 #endif

@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 #include <cmocka.h>
 
 #include "case/arch.h"
@@ -128,6 +129,29 @@ static void dense_ice_between_near_sides_can_arch(void **state)
     assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
 }
 
+/// Ice that ends beside the tow is told, from two floe sizes of water on.
+static void water_beside_the_ice_is_told(void **state)
+{
+    (void)state;
+    bt_case c = narrow();
+    c.domain.length = 200;
+    c.ice.x_min = 50, c.ice.x_max = 60; // ahead and astern there may be any
+    c.ice.y_min = -15, c.ice.y_max = 20;
+    assert_true(bt_arch_of(&c, 0.3, 0.5).water == 5);
+    assert_true(bt_arch_of(&c, 0.3, 2.5).water == 0);
+    assert_true(bt_arch_of(&c, 0, 0.5).water == 0);
+    bt_errors said = {0};
+    const bt_arch a = bt_arch_of(&c, 0.3, 0.5);
+    bt_arch_warn(&a, &said);
+    assert_int_equal(said.n, 1);
+    assert_non_null(strstr(said.text[0], "ice.y_min, ice.y_max: 5 m of open water"));
+    bt_errors_free(&said);
+    c.tow.direction = c.body.yaw = BT_PI / 2;
+    assert_true(bt_arch_of(&c, 0.3, 0.5).water == 190);
+    c.tow.mode = BT_TOW_NONE;
+    assert_true(bt_arch_of(&c, 0.3, 0.5).water == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -135,6 +159,7 @@ int main(void)
         cmocka_unit_test(the_extent_across_the_tow_counts),
         cmocka_unit_test(a_long_tow_needs_more_width),
         cmocka_unit_test(dense_ice_between_near_sides_can_arch),
+        cmocka_unit_test(water_beside_the_ice_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
