@@ -37,23 +37,25 @@ static bool is_request(const char *path)
     return lstat(path, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come.
+/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come. What may be damaged
+/// beyond knowing is ours beside another file that is.
 static const struct {
     const char *name;
     bool (*ours)(const char *path);
+    bool damaged;
 } files[] = {
-    {CASE_FILE, is_case},
-    {"summary.json", is_summary},
-    {BT_RESULT_FILE, is_regular}, // the result that --force is asked to replace, damaged or not
-    {BT_RESULT_PART, is_sealed},
-    {BT_RESULT_FILE ".tmp", is_sealed},
-    {"frames.xdmf", is_frames},
-    {BT_CHECKPOINT_FILE, is_sealed},
-    {BT_CHECKPOINT_FILE ".tmp", is_sealed},
-    {BT_CHECKPOINT_BEFORE, is_sealed},
-    {BT_CHECKPOINT_DAMAGED, NULL}, // what it holds has been found not to be sound
-    {BT_FAILURE_FILE, is_sealed},
-    {"stop", is_request},
+    {CASE_FILE, is_case, false},
+    {"summary.json", is_summary, false},
+    {BT_RESULT_FILE, is_regular, true},
+    {BT_RESULT_PART, is_sealed, false},
+    {BT_RESULT_FILE ".tmp", is_sealed, false},
+    {"frames.xdmf", is_frames, false},
+    {BT_CHECKPOINT_FILE, is_sealed, false},
+    {BT_CHECKPOINT_FILE ".tmp", is_sealed, false},
+    {BT_CHECKPOINT_BEFORE, is_sealed, false},
+    {BT_CHECKPOINT_DAMAGED, is_regular, true},
+    {BT_FAILURE_FILE, is_sealed, false},
+    {"stop", is_request, false},
 };
 enum { N_FILES = sizeof files / sizeof *files };
 
@@ -71,9 +73,25 @@ static bool holds(const char *dir, int k)
     char *path = bt_file_join(dir, files[k].name);
     struct stat st;
     const bool there = lstat(path, &st) == 0;
-    const bool yes = there && (S_ISLNK(st.st_mode) || !files[k].ours || files[k].ours(path));
+    const bool yes = there && (S_ISLNK(st.st_mode) || files[k].ours(path));
     free(path);
     return yes;
+}
+
+/// Has this program written into the folder, beyond doubt?
+static bool is_known(const char *dir)
+{
+    for (int k = 0; k < N_FILES; k++)
+        if (!files[k].damaged && files[k].ours != is_request && holds(dir, k)) return true;
+    return false;
+}
+
+/// Is what stands under the name of file k somebody else's?
+static bool is_foreign(const char *dir, int k, const char *path)
+{
+    if (!is_there(path)) return false;
+    if (!holds(dir, k)) return true;
+    return files[k].damaged && is_regular(path) && !is_sealed(path) && !is_known(dir);
 }
 
 bt_status bt_folder_check(const char *dir, bt_errors *err)
@@ -81,7 +99,7 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
     bt_status status = BT_OK;
     for (int k = 0; k < N_FILES; k++) {
         char *path = bt_file_join(dir, files[k].name);
-        if (is_there(path) && !holds(dir, k)) {
+        if (is_foreign(dir, k, path)) {
             bt_errors_add(err,
                           "%s: is no file that this program has written, and a run would replace it; move it away, or "
                           "give another folder with -o",

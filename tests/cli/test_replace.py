@@ -147,7 +147,7 @@ def test_a_failed_run_keeps_its_series(tmp_path):
 # ---- files of the user's ----
 
 FOREIGN = ["failure.h5", "frames.xdmf", "case.resolved.yml", "stop", "summary.json", "checkpoint.h5",
-           "result.part.h5", "checkpoint.previous.h5"]
+           "result.part.h5", "checkpoint.previous.h5", "result.h5", "checkpoint.damaged.h5"]
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]])
@@ -159,6 +159,13 @@ def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, force):
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
     assert result.returncode == IO and f"{out / name}: is no file that this program has written" in result.stderr
     assert contents(out) == {(out / name).relative_to(out): b"dear to somebody"}
+
+
+@pytest.mark.parametrize("damage", [b"", b"\0" * 4096])
+def test_a_result_beyond_knowing_is_replaced_beside_its_case(tmp_path, old, damage):
+    (old / "result.h5").write_bytes(damage)
+    r = run(tmp_path, OTHER, "--force")
+    assert r.summary["n_steps"] == 30 and (old / "result.h5").stat().st_size > 4096
 
 
 def test_an_old_request_to_stop_is_taken_away(tmp_path):
