@@ -278,7 +278,7 @@ PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
 deps-test: ## install what make test needs
 	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_TEST)'
 
-test: deps-test ## every test: units, known answers, same bits, command line, short runs under the sanitizers
+test: deps-test ## the tests: units, known answers, same bits, command line, short runs under the sanitizers
 	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)

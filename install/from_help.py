@@ -104,7 +104,8 @@ def man_page(found, own, codes, version):
         out += [f".SS bergtow {c.name} [\\fIOPTION\\fR...] \\fI{roff(c.operands)}\\fR", roff(c.about)]
         out += options_of(c)
     out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT",
-            *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"), *OF_SCRIPTS])]
+            *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
+                    ("BERGTOW_MPI", "yes or no: start MPI, or not"), *OF_SCRIPTS])]
     return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"
 
 

@@ -3,7 +3,7 @@
 """Scaling benchmark: the scenes of this folder over sizes, threads and ranks; writes bench.csv, bench.png and
 machine.txt.
 
-    make bench                 4 minutes on 2 quiet cores; BENCH=quick 1 minute; BENCH=full to 300,000 floes, 14 minutes
+    make bench                 4 minutes on 2 quiet cores; BENCH=quick 1 minute; BENCH=full to 300,000 floes, 25 minutes
     bench.py --sizes 1000,2000 --scenes tow-80 --repeats 5 --out out/bench
 
 The runs of one scene and size are interleaved (every configuration once, then again), so that a slow change of the

@@ -4,8 +4,8 @@
 // Data flow of one step (detect.c), cell by cell (cells.h):
 //   speeds ─> margins ─> pair list of the cell (kept over many steps) ─> narrow phase ─> contacts, in sweep order
 //
-// What the result depends on is only this: a contact exists for every pair of an active cell whose gap along the best
-// separating axis is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
+// What the result depends on is only this: a contact exists for every pair of an active cell whose gap (along the best
+// separating axis; of two corners that face each other their distance) is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
 // pairs are conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by
 // brute force).
 //

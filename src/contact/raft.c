@@ -51,6 +51,8 @@ static const bt_law_total totals[] = {
                            "work taken by friction between floes that lie over each other"},
 };
 
+#define LEAST_BLEND 1e-6 // of the mean floe, assumed: far beyond rounding, far below any slop but 0
+
 static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
 {
     const double rise = bt_case_rise(c->ice.density, c->water.density);
@@ -158,7 +160,8 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     double grad[2], turn, centroid[2], off[2];
     bt_overlap_clip(w, p->a, p->b, p->part, 0, 0, &o);
     bt_overlap_area(&o, centroid);
-    bt_overlap_gradient(w, p->a, p->b, p->part, &o, w->par.slop, grad, &turn);
+    const double blend = bt_max(w->par.slop, LEAST_BLEND * w->par.size); // rounding must not tell which edge is inside
+    bt_overlap_gradient(w, p->a, p->b, p->part, &o, blend, grad, &turn);
     bt_bodies_offset(w, p->a, p->b, off);
     *edge = (bt_manifold){.a = p->a, .b = p->b};
     *sheets = (bt_manifold){.a = p->a, .b = p->b, .nx = 1};

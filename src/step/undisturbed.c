@@ -4,12 +4,28 @@
 
 #include <math.h>
 
+#include "base/elementary.h"
 #include "body/bodies.h"
 #include "force/forces.h"
 #include "tow/tow.h"
 
+/// Of the convex hull, along which form drag acts, m.
+static double hull_perimeter(const bt_bodies *b, bt_idx i)
+{
+    const int n = bt_body_corners(b, i);
+    const double *v = b->vertices + 2 * b->offset[i], *per_length = b->per_length + b->offset[i];
+    const bt_mark *mark = b->mark + b->offset[i];
+    double sum = 0;
+    for (int k = 0; k < n; k++) {
+        const int to = mark[k].next;
+        if (to == (k + 1) % n) sum += 1 / per_length[k];
+        else if (to != k) sum += bt_hypot(v[2 * to] - v[2 * k], v[2 * to + 1] - v[2 * k + 1]); // across a bay
+    }
+    return sum;
+}
+
 /// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
-/// no direction has a width of its own. Mean width of a convex outline: perimeter / π (Cauchy).
+/// no direction has a width of its own. Mean width of a convex hull: its perimeter / π (Cauchy).
 static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
 {
     const bt_bodies *b = &w->bodies;
@@ -17,8 +33,7 @@ static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
     for (bt_gid g = 0; g < n_floes; g++) {
         const bt_idx i = bt_world_index(w, g);
         if (b->motion[i] != BT_DYNAMIC) continue;
-        double perimeter = 0;
-        for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
+        const double perimeter = hull_perimeter(b, i);
         v->mass += b->mass[i];
         v->share += b->share[i] * b->mass[i];
         v->inertia += b->inertia[i];

@@ -64,6 +64,9 @@ TEXTS = {
                         "bad.yml:5: water.tide.period: 1.9 s are fewer than 20 time steps"),
     "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"),
                            "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
+    "rafting of ice that does not float": (
+        GOOD.replace("size: 1", "rafting: {kappa: 10}, density: 1000") + "\nwater: {density: 1000}\n",
+        "ice.rafting.kappa: 10 beside ice as heavy as water", "0 for rigid floes"),
     "rafting that gives energy": (GOOD.replace("size: 1", "rafting: {kappa: 1.5}"),
                                   "bad.yml:3: ice.rafting.kappa: 1.5 is less than 2", "0 = they do not"),
     "ice that sinks": (GOOD.replace("size: 1", "density: 1000") + "water: {density: 900}\n",
@@ -258,11 +261,11 @@ def test_unwritable_field_file(folder):
 
 
 def test_a_result_is_not_replaced_unasked(folder):
-    (folder / "out" / "good").mkdir(parents=True)
     old = folder / "out" / "good" / "result.h5"
-    old.write_text("dear to somebody")
+    assert call("run", "good.yml", "--quiet", cwd=folder).returncode == DONE
+    old.write_text("damaged")
     refused(call("run", "good.yml", cwd=folder), IO, "out/good: holds a result", "--force")
-    assert old.read_text() == "dear to somebody"
+    assert old.read_text() == "damaged"
     result = call("run", "good.yml", "--force", "--quiet", cwd=folder)
     assert result.returncode == DONE, result.stderr
     assert old.read_bytes()[512:516] == b"\x89HDF"

@@ -333,6 +333,17 @@ def test_loose_ice_between_end_walls_drifts_and_dense_ice_does_not(tmp_path):
     assert e["speed_along_m_s"] == pytest.approx(0.4, rel=1e-9) and e["water_speed_m_s"] == pytest.approx(0.2, rel=1e-9)
 
 
+def test_a_floe_by_hand_is_no_undisturbed_ice_beside_a_field(tmp_path):
+    case = changed(DRIVEN, domain__ends="periodic", air__wind_x=0, run__duration=60, tow__ramp=0, output__window_start=0)
+    case["floes"] = [{"shape": "rectangle", "length": 10, "width": 10, "x": 250, "y": 0, "vx": 2}]
+    case["ice"]["x_max"] = 200
+    r = run(tmp_path, case, name="thrown")
+    assert r.series("speed_through_ice") == pytest.approx(0.4, rel=1e-12)
+    case["ice"] = {k: v for k, v in case["ice"].items() if k in ("thickness", "friction")} | {"concentration": 0}
+    alone = run(tmp_path, case, name="alone")  # is all the ice that there is
+    assert alone.series("speed_through_ice")[0] < -1
+
+
 def test_ice_that_a_tide_carries_past_a_moving_window_is_reported(tmp_path):
     """Red when the ends of the ways are compared: a tide brings the ice back."""
     tide = changed(DRIVEN, air__wind_x=0, water={"tide": {"major": 0.8, "period": 800}}, run__duration=800)

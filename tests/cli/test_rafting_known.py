@@ -23,7 +23,7 @@ Q0 = 0.5 * KAPPA * RHO_I * (1 - RHO_I / RHO_W) * G * H**2
 SHEETS = MU * (RHO_W - RHO_I) * G * H * A  # N for a metre of overlap
 
 
-def pushed(tmp_path, n, s):
+def pushed(tmp_path, n, s, slop=1e-3):
     """n floes that touch, between the body and the end wall, shortened by s."""
     body, slack = 1.0, 1e-3
     length = 1 + body + n * A + slack
@@ -38,10 +38,20 @@ def pushed(tmp_path, n, s):
         "tow": {"speed": V, "ramp": 0},
         "water": {"density": RHO_W},
         "output": {"window_start": 0, "frame_interval": s / V},
-        "solver": {"tolerance": 1e-7, "max_sweeps": 20000},
+        "solver": {"tolerance": 1e-7, "max_sweeps": 20000, "slop": slop},
     })
     assert r.summary["unconverged_steps"] == 0
     return r, slack
+
+
+def test_edges_that_lie_on_each_other_bear_load_without_slop(tmp_path):
+    """The sides of the two are in one line, and inside or outside of each other by rounding alone. (They then give way
+    to the sides, as far as the channel lets them, and rub along it.)"""
+    r, slack = pushed(tmp_path, 2, 1.0, slop=0)
+    area = A * (1.0 - slack)
+    assert r.summary["rafted_area_m2"] == pytest.approx(area, rel=0.005)
+    assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area, rel=0.005)
+    assert r.summary["raft_friction_work_j"] == pytest.approx(0.5 * SHEETS, rel=0.03)
 
 
 @pytest.mark.parametrize("n, s", [(2, 1.0), (3, 1.5), (5, 1.2)])

@@ -143,7 +143,7 @@ def test_rows_that_span_several_pieces(tmp_path):
 def test_an_error_is_reported_once_and_all_leave_with_its_code(tmp_path, arguments, code, fragment):
     write_case(tmp_path, SHORT)
     (tmp_path / "taken").mkdir()
-    (tmp_path / "taken/result.h5").write_text("a result")
+    (tmp_path / "taken/summary.json").write_text('{\n  "title": "a result"}')
     result = mpirun(3, *arguments, cwd=tmp_path)
     assert result.returncode == code, result.stderr
     assert len(ours(result)) == 1 and fragment in ours(result)[0], result.stderr

@@ -207,6 +207,26 @@ static void added_mass_takes_no_part(void **state)
     bt_world_free(w);
 }
 
+/// A square of 30 m with a bay of 22 × 14 m: 164 m around, 120 m around its hull, by which the mean floe has its form
+/// drag, as floes do.
+static void a_bay_adds_no_drag_to_undisturbed_ice(void **state)
+{
+    (void)state;
+    double v[] = {-15, -15, 15, -15, 15, -11, 1, -11, 1, 11, 15, 11, 15, 15, -15, 15};
+    bt_parts parts;
+    bt_params p = scene_params(1, 30);
+    bt_world *w = bt_world_create(&p);
+    bt_body_def d = scene_prism(8, v, 900);
+    assert_true(bt_outline_split(8, v, &parts));
+    d.parts = &parts;
+    d.drag = (bt_drag){.water_skin = 3, .water_form = 0.5, .air_form = 0.01};
+    bt_world_add(w, &d);
+    bt_undisturbed_create(w, 1, (const bool[2]){false, false});
+    CHECK_CLOSE(w->undisturbed->drag.water_skin, 3 + 0.5 * 120 / BT_PI, 1e-12);
+    CHECK_CLOSE(w->undisturbed->drag.air_skin, 0.01 * 120 / BT_PI, 1e-12);
+    bt_world_free(w);
+}
+
 /// Free drift of random bodies in random weather, drag over eight decades: found, and kept by the steps.
 static void free_drift_stays(void **state)
 {
@@ -284,6 +304,7 @@ int main(void)
         cmocka_unit_test(a_bay_is_passed_by),
         cmocka_unit_test(drag_never_reverses),
         cmocka_unit_test(added_mass_takes_no_part),
+        cmocka_unit_test(a_bay_adds_no_drag_to_undisturbed_ice),
         cmocka_unit_test(free_drift_stays),
         cmocka_unit_test(what_is_pushed_does_not_rest),
     };
