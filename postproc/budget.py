@@ -169,8 +169,8 @@ def of_all(e, some, converge):
 def read_converge(path, folder):
     if path is None:
         return findings.read("converge", folder)
-    found = findings.read("converge", path if path.is_dir() else path.parent)
-    if found is None:
+    found = findings.read("converge", path)
+    if not isinstance(found, dict) or "rows" not in found:
         raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
     return found
 

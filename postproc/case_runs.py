@@ -230,11 +230,11 @@ class CaseRuns:
         expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-len(missing) // self.jobs)
         if missing and time.monotonic() + expected > self.end:
             return False
-        why = [w for w in self.make(name, range(n), values) if w]
-        if SPENT in why:
+        why = {i: w for i, w in enumerate(self.make(name, range(n), values)) if w}
+        if SPENT in why.values():
             return False
-        if why:
-            raise RunError(self.path(name, 0), f"a run of {name} failed: {why[0]}",
+        for i, reason in why.items():
+            raise RunError(self.path(name, i), f"a run of {name} failed: {reason}",
                            "mend the case" if name == "case" else "leave it out of --vary", self.code_of_failure())
         return True
 
@@ -257,8 +257,8 @@ def ensemble_made(folder):
 
 def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
     """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
-    long as it takes). True when all have settled. Errors: RunError where the program refuses the study; a member that
-    fails is none, and the others are gathered as ever."""
+    long as it takes). True when all have settled: finished, or failed. Errors: RunError where the program refuses the
+    study; a member that fails is none, and the others are gathered as ever."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
     call += [part for text in sets for part in ("--set", text)]
     if np.isfinite(seconds):
@@ -269,7 +269,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
         raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
     sys.stderr.write(said)
     stopped_by_limit(code, said)
-    return code == DONE
+    return code != STOPPED
 
 
 def whole_from(least, most):

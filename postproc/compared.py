@@ -17,7 +17,7 @@ KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length",
         "tolerance": "solver.tolerance", "window": "output.window_start"}
 WINDOW = 0.01  # of its length: ends of a window fall on steps
 #: what makes another case of it; not where the domain lies, which goes with its size
-PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "domain.ends", "domain.sides")
+PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "lead.", "domain.ends", "domain.sides", "domain.wall_")
 PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "body.x", "body.y", "tow.ramp")
 
 
@@ -86,6 +86,14 @@ def _differ(a, b):
     return a.rpartition("/")[2] != b.rpartition("/")[2]
 
 
+def unlike(a, b, but=()):
+    """(key, its text in a, in b) of what makes another case of b: keys that both have, `but` these."""
+    for key, value in a.items():
+        if (key.startswith(PHYSICAL) or key == "run.dt") and key not in (*PLACES, *but) and key in b \
+                and _differ(value, b[key]):
+            yield key, value, b[key]
+
+
 def common(texts):
     """{key: text} of what all these cases have alike."""
     return {k: v for k, v in (texts[0] if texts else {}).items() if all(t.get(k) == v for t in texts)}
@@ -105,13 +113,33 @@ def stale(found, e):
     return "" if then == now["finished"] else f"of {then} members, while {now['finished']} have finished"
 
 
+def _beside(found, texts):
+    """(key, its text in what was found, those of the members' cases) of what makes another case."""
+    for key, value in (found.get("values") or {}).items():
+        some = list(dict.fromkeys(text[key] for text in texts if key in text))
+        if some and key.startswith(PHYSICAL) and key not in PLACES:
+            yield key, value, some
+
+
+def _among(value, some):
+    """Is a value one of these, or between the least and the largest of numbers?"""
+    numbers = np.array([case_value({"": text}, "") for text in some])
+    x = case_value({"": value}, "")
+    between = np.isfinite([x, *numbers]).all() and numbers.min() <= x <= numbers.max()
+    return between or not all(_differ(value, text) for text in some)
+
+
 def misfit(found, texts):
     """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say
-    of which it is: a key of the ice, the body, the tow, water or air that all members have alike, and it has not."""
-    for key, value in (found.get("values") or {}).items():
-        if not key.startswith(PHYSICAL) or key in PLACES:
-            continue
-        some = {text[key] for text in texts if key in text}
-        if len(some) == 1 and _differ(value, other := some.pop()):
-            return f"{key} is {value} there and {other} here"
+    of which it is: a key of the ice, the body, the tow, water or air is not as in any of them."""
+    for key, value, some in _beside(found, texts):
+        if not _among(value, some):
+            return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
     return ""
+
+
+def alone(found, texts):
+    """Of which of several values of the members what was found speaks: "ice.concentration 0.8", "" where they have no
+    other."""
+    return ", ".join(f"{key} {value}" for key, value, some in _beside(found, texts)
+                     if any(_differ(value, text) for text in some))

@@ -40,6 +40,7 @@ FIELDS = (4, 8, 16, 32, 64, 128, 256)  # of each look
 LOOKS = len(FIELDS)
 TRIES = 3                   # values of a quantity after each other, at most
 MARGIN = 0.1
+UNSOLVED = 0.01             # share of steps short of the tolerance above which runs do not tell of it
 BUDGET = 10.0               # min
 WINDOW_TOO_EARLY = "no longer ramp ends before the window: tow for longer, with a later window"
 EFFORT = 0.05               # relative error of the mean that the number of fields is for
@@ -154,6 +155,13 @@ def judged(interval, margin, one_sided=False):
     return "matters" if low > margin or high < -margin else "open"
 
 
+def unsolved(study, name, n):
+    """Share of the steps of n runs that did not reach the tolerance: what they make does not hang on it."""
+    missed, steps = (study.measured(name, range(n), lambda run, key=key: run.number(key)).sum()
+                     for key in ("unconverged_steps", "n_steps"))
+    return missed / steps if steps > 0 else 0.0
+
+
 def compare(study, kind, base_name, base_values, name, values, margin):
     """A row of one value against the next, with as many fields as it takes."""
     row = {"quantity": kind.what, "effect": np.nan, "interval_95": (np.nan, np.nan), "fields": 0, "judged": "open",
@@ -165,6 +173,9 @@ def compare(study, kind, base_name, base_values, name, values, margin):
         other = study.measured(base_name if kind.own else name, range(n), kind.measure)
         if not (np.isfinite(base).all() and np.isfinite(other).all()):
             return row | {"why": f"a run has no {kind.what}"}
+        if (missed := max(unsolved(study, m, n) for m in {base_name, base_name if kind.own else name})) > UNSOLVED:
+            return row | {"fields": n, "why": f"{100 * missed:.2g} % of the steps ended at solver.max_sweeps, short of "
+                          "the tolerance; raise it"}
         if base.mean() == 0 or base.max() == base.sum():  # nothing to hold it against, without one field at least
             return row | {"fields": n, "why": f"nothing to hold the {kind.what} against",
                           "judged": "matters" if kind.own and other.min() > 0 else "open"}
@@ -276,7 +287,10 @@ def converge(study, names, margin, tries=TRIES):
                        "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
-        rows += window(study, margin)
+        try:
+            rows += window(study, margin)
+        except RunError as error:
+            rows.append({"name": "window", "key": "output.window_start", "judged": "open", "why": error.reason})
     if "fields" in names:
         rows += fields_row(study)
     return rows

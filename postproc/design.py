@@ -33,7 +33,7 @@ from case_file import contents, files, is_study, says, section
 from case_runs import above_zero, checked, program, run_members
 from domain_width import read_ice_of, reads_ice
 from ensemble import whole
-from ensemble_read import FINISHED, Ensemble
+from ensemble_read import FINISHED, WAITING, Ensemble
 from report_case import TITLE_BLOCK
 
 import numpy as np
@@ -106,10 +106,15 @@ def write_study(a, case, repeats, wider):
     return path
 
 
-def fields_done(e):
-    """Fields that have finished in every condition, from the first on."""
-    done = [int(np.argmin(np.append(e.status[c.members] == FINISHED, False))) for c in e.conditions()]
-    return min(done, default=0)
+def fields_settled(folder):
+    """Fields that have finished or failed in every condition, from the first on; 0 where nothing is there. One that
+    failed is not left out: a field that jams is none that can be done without."""
+    try:
+        e = Ensemble(folder)
+    except RunError:
+        return 0
+    settled = [int(np.argmin(np.append(e.status[c.members] != WAITING, False))) for c in e.conditions()]
+    return min(settled, default=0)
 
 
 def seconds_a_field(e):
@@ -144,20 +149,20 @@ def run_case(work, a, case):
         print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
               "fields")
         a.fields = 1
-    n = min(FIRST, a.fields)
+    n = min(max(FIRST, fields_settled(a.output)), a.fields)
     wider = widths(work, a, case)
     for c, width in wider.items():
         print(f"at {100 * c:g} % the domain is made {width} wide: narrower, its periodic images would carry part "
               "of the load (--keep-width: leave it as it is)")
     whole_round = work.ensemble(write_study(a, case, n, wider))
-    if not whole_round and fields_done(Ensemble(a.output)) < 1:
+    if not whole_round and fields_settled(a.output) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
     rate = seconds_a_field(Ensemble(a.output)) / work.jobs
     replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Ensemble(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
     end = work.end
-    while whole_round and n < a.fields:
+    while whole_round and rate > 0 and n < a.fields:  # at 0 all have failed
         more, kept = more_fields(end - time.monotonic(), rate, replay, n, a.fields)
         if more < 1:
             break
@@ -167,7 +172,7 @@ def run_case(work, a, case):
         rate = (time.monotonic() - start) / more
         n += more
     if not whole_round:
-        n = max(1, fields_done(Ensemble(a.output)))
+        n = max(1, fields_settled(a.output))
         work.end = np.inf  # nothing is left to run; the members are gathered once more
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):

@@ -130,7 +130,7 @@ def extremes(s, markdown):
         "condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
         *(f"once in {T:g} h" for T in hours)
     ]
-    rows = []
+    rows, short = [], []
     for c in some:
         x = c["extremes"]
         first = [
@@ -144,6 +144,7 @@ def extremes(s, markdown):
                 rows.append([c["label"], label, *first, "–", "–", *["–"] * len(hours)])
                 continue
             at = {level["hours"]: level for level in f["levels"]}
+            short += loads_text.cut(c["label"], f, x["hours"])
             rows.append([
                 c["label"], label, *first,
                 f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
@@ -163,7 +164,8 @@ def extremes(s, markdown):
         "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
         f"peak seen. No bound: the upper end is more than {FAR:g} times the level."
     )
-    return table(head, rows, markdown) + "\n\n" + "\n".join([text, *(f"No fit for {r}." for r in sorted(refused))])
+    return table(head, rows, markdown) + "\n\n" + "\n".join(
+        [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))])
 
 
 def sensitivity(s, markdown):

@@ -73,10 +73,12 @@ def also(folders):
                            "name the folder of bergtow converge, budget or capability with --also")
 
 
-def read(name, folder):
-    """What a command left in a folder, None where there is nothing, or it cannot be read."""
+def read(name, place):
+    """What a command left in a folder, or in a file of another name; None where there is nothing, or it cannot be
+    read."""
+    path = Path(place)
     try:
-        return json.loads((Path(folder) / f"{name}.json").read_text(encoding="utf-8"))
+        return json.loads((path if path.is_file() else path / f"{name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
 

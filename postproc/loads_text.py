@@ -245,6 +245,22 @@ def panel_lines(s):
     return out
 
 
+CUT = 0.9  # of the hours: where the blocks have less, it is said
+
+
+def cut(name, f, hours):
+    """["of NAME, blocks of one length have 12 of 20 h, and none is of 3 fields"] of a fit that leaves out more than a
+    little; [] of others. name: of what, hours: of all fields."""
+    used, none = f.get("hours", hours), f.get("without_block", 0)
+    if used >= CUT * hours and not none:
+        return []
+    return [f"{name}: {number(used)} of {number(hours)} h{f', and none of {none} fields' if none else ''}"]
+
+
+def cut_note(some):
+    return [f"Blocks are of one length, what is left over is in no block: {several(some)}."] if some else []
+
+
 def returns(s, markdown):
     """Return levels of the whole signal by both models of the tail."""
     hours = sorted({level["hours"] for c in s["conditions"] for x in c["loads"].values()
@@ -254,7 +270,7 @@ def returns(s, markdown):
                           if "refused" in x[kind]})
         return "No return levels" + (f": {several(refused)}." if refused else ".")
     head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
-    rows, refused = [], {}
+    rows, refused, short = [], {}, []
     for name in names(s):
         factor, unit, first = _unit(s, name)
         for kind, label in NAMES.items():
@@ -266,6 +282,7 @@ def returns(s, markdown):
                 if "refused" in f:
                     refused.setdefault((first["label"], label), []).append(f"{c['label']}: {f['refused']}")
                     continue
+                short += cut(f"{c['label']}, {first['label']}", f, x["hours"])
                 at = {level["hours"]: level for level in f["levels"]}
                 rows.append([c["label"], first["label"], label,
                              f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
@@ -281,7 +298,7 @@ def returns(s, markdown):
     # what to do about it is for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *said])
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *cut_note(short), *said])
 
 
 def level(found, factor):

@@ -4,10 +4,12 @@
 Runs of one concentration (other seeds) are drawn one by one, and stand in the table as their mean.
 """
 import argparse
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import command
+import compared
 import style
 from bergtow_read import Run, RunError
 
@@ -34,6 +36,8 @@ class Point:
     unconverged: float    #: share of the steps
     warnings: int
     estimates: dict       #: {name: Estimate}
+    case: dict            #: {key: text}
+    state: str            #: hash of the end, "" where the run does not say
     conditions: dict      #: of the estimates: thickness_m, width_m, ..., and "curves"
 
     @property
@@ -68,6 +72,8 @@ def read(path):
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
                      warnings=len(run.summary.get("warnings") or []),
                      estimates=run.estimates,
+                     case=dict(run.case),
+                     state=str(run.summary.get("state_hash") or ""),
                      conditions=estimates)
 
 
@@ -90,6 +96,23 @@ def check_alike(points):
                     other.path,
                     f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
                     "draw them in pictures of their own")
+        key, here, there = next(compared.unlike(first.case, other.case, ("ice.concentration", )), (None, "", ""))
+        if key:
+            raise RunError(other.path, f"has another case than {first.path}: {key} is {here} there and {there} here",
+                           "draw them in pictures of their own")
+
+
+def once(points):
+    """The points without runs that end in the same state as one before: the same run again, or ice that no seed
+    changes."""
+    seen, out = set(), []
+    for p in points:
+        if p.state and p.state in seen:
+            print(f"plot_resistance.py: left out: {p.path}: ends in the same state as a run before it", file=sys.stderr)
+        else:
+            out.append(p)
+        seen.add(p.state)
+    return out
 
 
 def rows(points):
@@ -315,7 +338,7 @@ def main(argv=None):
         p.error(f"{path}: unknown kind of file; end the name in {', '.join(command.PICTURES)}")
     for place in filter(None, (path, a.table)):
         command.may_write(place, a.force)
-    points = [read(run) for run in a.run]
+    points = once([read(run) for run in a.run])
     command.save(draw(points, not a.linear), path, a.force)
     if a.table:
         command.write_markdown(table(points), a.table, a.force)

@@ -315,6 +315,8 @@ def doubt(name, found, folder, texts):
     in its folder; "" where it is. What does not say of what it is has no doubt: the files of earlier programs."""
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
+    if name == "converge" and (at := compared.alone(found, texts)):
+        return f"studied at {at} alone: of the other tows of this report it says nothing"
     try:
         why = compared.stale(found, Ensemble(folder)) if name == "budget" else ""
     except RunError:  # the folder holds what was found alone

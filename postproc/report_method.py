@@ -204,7 +204,9 @@ def _convergence(found, e):
     words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
              ("elsewhere", "not compared at the value of these tows:"))
     some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
-    return "; ".join(f"{said} {', '.join(names)}" for said, names in some if names) or "nothing compared"
+    at = compared.alone(found, texts)
+    return "; ".join([f"{said} {', '.join(names)}" for said, names in some if names] +
+                     [f"studied at {at} alone"] * bool(at)) or "nothing compared"
 
 
 def beyond(results, e):

@@ -80,7 +80,8 @@ def _of_a_chain(chain):
         matters = row.get("judged") == "matters"
         squares += (factor * ((high - low) / 4 if matters else max(abs(low), abs(high)) / 2)) ** 2
         factor *= 1 + row["effect"] if matters else 1.0
-    return factor - 1, np.sqrt(squares), "matters up to the last value compared" if matters else ""
+    why = {"matters": "matters up to the last value compared", "open": row.get("why") or "not resolved"}
+    return factor - 1, np.sqrt(squares), why.get(row.get("judged"), "")
 
 
 def relative_numerics(rows, own):

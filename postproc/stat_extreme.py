@@ -266,10 +266,15 @@ def rate_share(alone, by_field, level, best):
     return share if np.isfinite(share) and share >= 1 else 1.0
 
 
+SHORT = 0.5  # of the middle one of the fields by length: shorter ones do not set the length of the blocks
+
+
 def _blocks(fields, blocks):
-    """(maxima of the blocks of each field, hours of a block). Blocks are of one length: so many in the middle one of
-    the fields by length. What a field has beyond its whole blocks is left out."""
-    length, out = float(np.median([f["hours"] for f in fields])) / blocks, []
+    """(maxima of the blocks of each field, hours of a block). Blocks are of one length: so many in the shortest of the
+    fields that are at least half as long as the middle one. What a field has beyond its whole blocks is left out, and
+    so are fields that have none."""
+    hours = np.array([f["hours"] for f in fields])
+    length, out = float(hours[hours >= SHORT * np.median(hours)].min()) / blocks, []
     for f in fields:
         count = int(f["hours"] / length + 0.01)
         within = f["time"] <= f["start"] + 3600 * count * length * (1 + 1e-9)
@@ -293,7 +298,7 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
     value, same = commonest(maxima[~empty])
     if same > max(1, EMPTY * len(maxima)):
         return {"refused": f"the largest of {same} of {len(maxima)} blocks is the same, {value:.4g} N: no GEV"}
-    total = sum(f["hours"] for f in fields)
+    total = len(maxima) * length
     there = [x[np.isfinite(x)] for x in each]
     fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
     if fitted.refused:
@@ -301,7 +306,8 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
     location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
     levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in hours_of_levels])
     return {
-        "blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale,
+        "blocks": len(maxima), "block_hours": length, "hours": total, "without_block": sum(len(x) == 0 for x in each),
+        "empty": int(empty.sum()), "location": location, "scale": scale,
         "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
         "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
         "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}

@@ -72,10 +72,14 @@ def rows(base, e):
     return np.array(out)
 
 
-def label(c):
-    """A condition without what follows from its first key."""
-    key, value = next(iter(c.values.items()))
-    return worded(key, value, c.units[key])
+def varied(e):
+    """Keys with more than one value, in the order of the study."""
+    values = [c.values for c in e.conditions()]
+    return [key for key in values[0] if len({v[key] for v in values}) > 1] or list(values[0])
+
+
+def label(e, c):
+    return ", ".join(worded(key, c.values[key], c.units[key]) for key in varied(e)) or c.label
 
 
 def table(head, lines):
@@ -88,7 +92,7 @@ def table(head, lines):
 def report(studies):
     base = studies[0][1]
     factor, unit = style.scale([m for _, e in studies for m in rows(base, e)[:, 0]], "N")
-    names, labels = [name for name, _ in studies], [label(c) for c in base.conditions()]
+    names, labels = [name for name, _ in studies], [label(base, c) for c in base.conditions()]
     of = [rows(base, e) for _, e in studies]
 
     def number(x, text):
@@ -118,30 +122,45 @@ def soundness_of(e):
             f"{100 * np.nanmax(e.summary['max_overlap_relative'][used]):.1f} % of a floe, but for rafting")
 
 
+def places(base):
+    """(x [conditions], order along it, name of the axis, texts or None): the number that was varied, or a place for
+    each condition where it is no number, or several were."""
+    keys, conditions = varied(base), base.conditions()
+    if len(keys) == 1 and not isinstance(conditions[0].values[keys[0]], str):
+        scale, unit = reading(keys[0], base.units[keys[0]])
+        x = scale * np.array([c.values[keys[0]] for c in conditions])
+        return x, np.argsort(x), f"{short_key(keys[0])}, {unit}".rstrip(", "), None
+    x = np.arange(len(conditions), dtype=float)
+    return x, np.arange(len(x)), "", [label(base, c) for c in conditions]
+
+
 def draw(studies):
-    """Means and their changes over the first key that was varied."""
+    """Means and their changes over what was varied."""
     base = studies[0][1]
-    key = next(iter(base.conditions()[0].values))
-    scale, unit_of_key = reading(key, base.units[key])
-    x = scale * np.array([c.values[key] for c in base.conditions()])
+    x, order, axis, texts = places(base)
+    line = "" if texts else None  # between conditions of several kinds there is none
     figure, (above, below) = plt.subplots(2, 1, figsize=(8.4, 8.2), sharex=True, height_ratios=(3, 2))
     figure.subplots_adjust(left=0.11, right=0.97, top=0.9, bottom=0.08, hspace=0.08)
     of = [rows(base, e) for _, e in studies]
     factor, unit = style.scale(np.concatenate([r[:, 0] for r in of]), "N")
-    shift = 0.004 * np.ptp(x) * (np.arange(len(studies)) - (len(studies) - 1) / 2)
+    shift = 0.004 * max(np.ptp(x), 1.0) * (np.arange(len(studies)) - (len(studies) - 1) / 2)
     for (name, _), r, (colour, dashes), dx in zip(studies, of, LINES, shift):
-        above.errorbar(x + dx, r[:, 0] / factor, r[:, 4] / factor, color=colour, linestyle=dashes, marker="o",
-                       markersize=3.5, linewidth=1.4, capsize=2, label=name)
-        if r is not of[0]:
-            below.errorbar(x + dx, r[:, 2], r[:, 3], color=colour, linestyle=dashes, marker="o", markersize=3.5,
-                           linewidth=1.4, capsize=2)
+        look = {"color": colour, "linestyle": dashes if line is None else line, "marker": "o", "markersize": 3.5,
+                "linewidth": 1.4, "capsize": 2}
+        r = r[order]
+        above.errorbar(x[order] + dx, r[:, 0] / factor, r[:, 4] / factor, label=name, **look)
+        if name != studies[0][0]:
+            below.errorbar(x[order] + dx, r[:, 2], r[:, 3], **look)
     above.set_yscale("log")
     style.logarithmic(above.yaxis)
     above.set_ylabel(f"mean ice resistance, {unit}")
     above.legend(frameon=False, fontsize=9)
     below.axhline(0, color=style.INK, linewidth=0.8)
     below.set_ylabel("change of the mean, %")
-    below.set_xlabel(f"{short_key(key)}, {unit_of_key}".rstrip(", "))
+    below.set_xlabel(axis)
+    if texts:
+        below.set_xticks(x, texts, rotation=30, ha="right", fontsize=8)
+        figure.subplots_adjust(bottom=0.22)
     figure.text(0.11, 0.955, base.title, fontsize=12)
     figure.text(0.11, 0.925, f"the same fields with one value changed; against \"{studies[0][0]}\"; bars: 95 %",
                 fontsize=9, color=style.FAINT)

@@ -172,6 +172,9 @@ def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
     own = {"dt": 1.0, "width": 10.0, "length": 1.0, "tolerance": 1.0, "window": (10.0, 30.0)}
     found, text = said_of(every, own, rng)
     assert "at most" in text and "bias" not in text and "without" not in text and "bias_share" not in found["numerics"]
+    every[-2] |= {"judged": "open", "why": "the budget is spent", "interval_95": [-0.3, 0.6]}  # tolerance
+    found, text = said_of(every, own, rng)
+    assert "at most" not in text and "tolerance (the budget is spent)" in text
     nothing, text = said_of(ROWS, {"width": 40.0}, rng)
     assert np.isnan([nothing["numerics"]["sd"], nothing["numerics"]["share"]]).all() and "not known" in text
     refused, text = said_of({"refused": "converge.json is of another case, ice.size is 1 m there and 2 m here"}, None,
@@ -180,13 +183,31 @@ def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
 
 
 def test_converge_of_another_case_does_not_fit():
-    """A key that all members have alike, and it has not; not one that is varied, nor one of the computation."""
-    texts = [{"ice.size": "2 m", "ice.friction": f"{f}", "run.dt": "1 s", "ice.field": "/a/field.h5"} for f in (1, 2)]
+    """A key that no member has so; not one of the computation. Of a key that is varied, a value between those of the
+    members fits, and is named where it is one of several."""
+    texts = [{"ice.size": "2 m", "ice.friction": f"{f}", "run.dt": "1 s", "ice.field": "/a/field.h5",
+              "ice.shape": ("voronoi", "rectangles")[f - 1], "lead.mode": "none"} for f in (1, 2)]
     def why(**values):
         return compared.misfit({"values": texts[0] | {k.replace("__", "."): v for k, v in values.items()}}, texts)
-    assert why() == why(ice__friction="9", run__dt="5 s", ice__field="/b/field.h5") == compared.misfit({}, texts) == ""
+    assert why() == why(ice__friction="1.5", run__dt="5 s", ice__field="/b/field.h5") == compared.misfit({}, texts) == ""
+    assert why(ice__friction="9") == "ice.friction is 9 there and of 2 other values here"
+    assert why(ice__shape="polygons") == "ice.shape is polygons there and of 2 other values here"
+    assert why(lead__mode="channel") == "lead.mode is channel there and none here"
+    assert compared.alone({"values": texts[1]}, texts) == "ice.friction 2, ice.shape rectangles"
+    assert compared.alone({"values": texts[1]}, texts[1:]) == compared.alone({}, texts) == ""
     assert why(ice__size="3 m") == "ice.size is 3 m there and 2 m here"
     assert why(ice__field="other.h5") == "ice.field is other.h5 there and /a/field.h5 here"
+
+
+def test_the_file_that_is_named_is_read(tmp_path):
+    """Red: that beside it was, whatever the name."""
+    for name, title in (("converge", "OTHER"), ("converge-80", "NAMED")):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"rows": [], "title": title}))
+    assert budget.read_converge(tmp_path / "converge-80.json", tmp_path)["title"] == "NAMED"
+    assert budget.read_converge(tmp_path, tmp_path)["title"] == "OTHER"
+    for wrong in ("no-such.json", "nowhere"):
+        with pytest.raises(RunError, match="is no converge.json"):
+            budget.read_converge(tmp_path / wrong, tmp_path)
 
 
 # ---- studies with gaps

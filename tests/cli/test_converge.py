@@ -83,6 +83,19 @@ def test_a_window_without_resistance_has_nothing_to_compare(monkeypatch):
     assert row["judged"] == "open" and row["why"].startswith("nothing to hold") and asked == [4]
 
 
+def test_a_window_whose_runs_fail_leaves_the_other_rows(monkeypatch):
+    def failed(name, n, values):
+        if n > 4:
+            raise RunError(Path("out/case/f021"), "a run of case failed: no sound state", "mend the case", 5)
+        return True
+    study = SimpleNamespace(there=failed, folder=Path("out"), end=np.inf, made=0)
+    monkeypatch.setattr(converge, "varied", lambda *a: {"dt": [{"name": "dt", "judged": "none"}]})
+    monkeypatch.setattr(converge, "window", lambda study, margin: study.there("case", 8, {}))
+    rows = converge.converge(study, ["dt", "window"], 0.1)
+    assert [(row["name"], row["judged"]) for row in rows] == [("dt", "none"), ("window", "open")]
+    assert "no sound state" in rows[1]["why"]
+
+
 CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20, ice__concentration=0.5)
 
 
@@ -147,6 +160,16 @@ def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp
     assert first["judged"] == "none" and first["same_ice"] and "0.001 will do" in text
     assert found["values"]["ice.concentration"] == "0.2"  # of which case it speaks, for other studies
     assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text
+
+
+def test_runs_that_do_not_reach_their_tolerance_tell_nothing_of_it(tmp_path):
+    """Red: both values end at the limit of work, make nearly the same, and "will do"."""
+    dense = changed(CASE, ice__concentration=0.7, run__duration=10, output__window_start=4, solver={
+        "tolerance": 1e-6, "max_sweeps": 1})
+    found, text = converged(tmp_path, dense, "--vary", "tolerance", "--budget", 3, "--margin", 0.5)
+    row, = found["rows"]
+    assert row["judged"] == "open" and "% of the steps ended at solver.max_sweeps" in row["why"]
+    assert row["recommended"] is None and "will do" not in text
 
 
 @pytest.mark.slow

@@ -229,6 +229,34 @@ def test_a_budget_that_does_not_reach(tmp_path, monkeypatch):
                      "0.5", "--quiet"])
 
 
+def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
+    """Red: one failure ended the call, the study was cut to the fields before it, and nobody heard of it."""
+    path = write_case(tmp_path, CASE)
+    asked = []
+
+    def ensemble(study, failing=("c001", 1)):
+        repeats = yaml.safe_load(study.read_text())["repeats"]
+        asked.append(repeats)
+        made_up.write(tmp_path / "out", [
+            made_up.member(np.full(3, 10.0 + r), {"ice.concentration": 0.2 + 0.2 * c}, c, reason="it jammed",
+                           status=made_up.FAILED if (c, r) == (0, 1) else made_up.FINISHED)
+            for c in range(2) for r in range(repeats)])
+        return True
+    (tmp_path / "out").mkdir()
+    for name, value in (("seconds_a_field", 1.0), ("seconds_of_the_longest", 0.0), ("widths", {})):
+        monkeypatch.setattr(design, name, lambda *a, value=value: value)
+    a = design.arguments([str(path), "-o", str(tmp_path / "out"), "--fields", "8", "--no-replay", "--concentrations",
+                          "0.2,0.4"])
+    work = SimpleNamespace(ensemble=ensemble, jobs=2, end=np.inf, program=BERGTOW)
+    work.end = design.time.monotonic() + 1000
+    design.run_case(work, a, {name: {} for name in design.SECTIONS})
+    assert asked == [2, 8] and design.fields_settled(tmp_path / "out") == 8
+    assert "c001-r002" in Ensemble(tmp_path / "out").holes()
+    asked.clear()  # a later call begins with what is there
+    design.run_case(work, a, {name: {} for name in design.SECTIONS})
+    assert asked == [8] and design.fields_settled(tmp_path / "nowhere") == 0
+
+
 def test_ice_that_is_read_gets_one_field(tmp_path, capsys):
     """Every other one would be the same run."""
     made_up.write(tmp_path / "out", [made_up.member(np.ones(9), {}, 0)])
