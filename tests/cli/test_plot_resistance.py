@@ -11,6 +11,7 @@ from test_postproc import done, make_run, pixels, where
 
 import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
 import style  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
 
 BERG = {
     "run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
