@@ -262,6 +262,7 @@ typedef struct bt_case {
     /// [k] values of keys that were added to the table (bt_keys_add: of force laws, of contact laws and of sections of
     /// a program), SI, in the order of their addition
     double extra[BT_EXTRA_KEYS];
+    int n_extra;                 ///< keys that had been added when it was read: it knows of no others
 } bt_case;
 
 /// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to

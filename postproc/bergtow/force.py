@@ -19,7 +19,8 @@ _FX, _FY, _MOMENT, _G, _GX, _GY, _GW, _JX, _JY, _JW = range(_library.LOADS)
 
 
 def _view(pointer: Any, *shape: int, writeable: bool = False) -> np.ndarray:
-    view = np.ctypeslib.as_array(pointer, shape)
+    # without bodies there is nothing that a pointer could point at
+    view = np.ctypeslib.as_array(pointer, shape) if shape[0] else np.empty(shape, pointer._type_)
     view.flags.writeable = writeable
     return view
 
@@ -82,6 +83,9 @@ class Bodies:
     def _add(self, answer: npt.ArrayLike) -> None:
         """What a force returns."""
         given, n = np.asarray(answer, float), len(self.id)
+        if n and np.may_share_memory(given, self._load):
+            raise ValueError("a force returned what it has filled in (bodies.force, moment or load), which would count "
+                             "twice; return nothing, or an array of its own")
         if given.shape not in ((n, 2), (n, 3)):
             raise ValueError(f"a force returned an array of the shape {given.shape}; with {n} bodies it has to be "
                              f"({n}, 2), forces, or ({n}, 3), with moments")

@@ -2,6 +2,7 @@
 """Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read when it is used."""
 from __future__ import annotations
 
+import functools
 import html
 import json
 import os
@@ -77,8 +78,9 @@ def _imported(name: str) -> Any:
                            f"`pip install {name}`", IO) from None
 
 
-def _wrapper(xarray: Any) -> Callable[..., Any]:
-    """A function that makes arrays which read an HDF5 dataset when they are indexed."""
+@functools.lru_cache(maxsize=1)
+def _stored_class() -> Any:
+    """A class of arrays that read an HDF5 dataset when they are indexed."""
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
@@ -89,7 +91,16 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
             self.shape = shape if part is None else (shape[0], part.stop - part.start, *shape[2:])
             self.dtype = dataset.dtype
 
+        def __deepcopy__(self, memo: Any) -> Any:
+            return self  # it only reads
+
+        def __reduce__(self) -> Any:
+            return _stored_again, (self.dataset.file.filename, self.dataset.name, self.column, self.part)
+
         def __getitem__(self, key: Any) -> Any:
+            if any(getattr(k, "size", 1) == 0 for k in key.tuple):  # which HDF5 does not know
+                nothing = np.broadcast_to(np.zeros((), self.dtype), self.shape)
+                return indexing.NumpyIndexingAdapter(nothing)[key]
             return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER_1VECTOR,
                                                       self._get)
 
@@ -105,7 +116,19 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
                 return slice(start + part.start, max(stop, 0) + part.start, step)
             return key + part.start
 
-    return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(Stored(dataset, column, part))
+    return Stored
+
+
+def _stored_again(path: str, name: str, column: int | None, part: slice | None) -> Any:
+    """One that was pickled; the file stays open as long as it is used."""
+    return _stored_class()(_imported("h5py").File(path)[name], column, part)
+
+
+def _wrapper(xarray: Any) -> Callable[..., Any]:
+    """A function that makes arrays which read an HDF5 dataset when they are indexed."""
+    from xarray.core import indexing
+
+    return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(_stored_class()(dataset, column, part))
 
 
 def _text(value: Any) -> Any:
@@ -154,6 +177,9 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
         file = hdf5.File(path)
     except OSError as error:
         raise BergtowError(f"{path}: cannot be read ({error}); give the folder that a run has left", IO) from None
+    if "time" not in file.get("series", {}):
+        file.close()
+        raise BergtowError(f"{path}: holds no series of a run; give the folder that a run has left", IO)
     stored = _wrapper(xarray)
     variables: dict[str, Any] = {}
 

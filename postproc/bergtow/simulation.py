@@ -34,6 +34,13 @@ def _pointer(array: np.ndarray) -> Any:
     return array.ctypes.data_as(POINTER(c_double))
 
 
+def _id(body: int) -> int:
+    """One that the library can take; which bodies there are is its own affair."""
+    if not -2**63 <= body < 2**63:
+        raise IndexError(f"body {body}: there is none")
+    return body
+
+
 class Simulation:
     """A simulation of a case, step by step.
 
@@ -263,11 +270,11 @@ class Simulation:
 
     def set_velocity(self, body: int, x: float, y: float, rate: float = 0.0) -> None:
         """m/s, m/s, rad/s. Refused for a body whose velocity is prescribed."""
-        self._library.bt_simulation_set_velocity(self._s, body, x, y, rate)
+        self._library.bt_simulation_set_velocity(self._s, _id(body), x, y, rate)
 
     def set_position(self, body: int, x: float, y: float, yaw: float) -> None:
         """m, m, rad. Refused outside of the domain, over another body, and for a body that is towed."""
-        self._library.bt_simulation_set_place(self._s, body, x, y, yaw)
+        self._library.bt_simulation_set_place(self._s, _id(body), x, y, yaw)
 
     # --- numbers ------------------------------------------------------------------------------------------------------
 

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+bool (*bt_series_may_be)(const char *name, int more, struct bt_errors *err);
+
 bool bt_is_name(const char *s, int most)
 {
     for (const char *p = s; *p; p++)

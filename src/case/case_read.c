@@ -31,6 +31,7 @@ void bt_case_defaults(bt_case *c)
 {
     *c = (bt_case){0};
     bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
+    c->n_extra = bt_schema_added();
 }
 
 /// Is the first word of a text, which has more, a key of this section (with its dot)?

@@ -47,7 +47,8 @@ char *bt_case_text(const bt_case *c, const char *head)
     FILE *out = text.out;
     fputs(head, out);
     const char *previous = "";
-    for (int k = 0; k < bt_n_case_keys; k++) {
+    const int n = bt_n_case_keys - bt_schema_added() + c->n_extra; // of a law that came later it has no values
+    for (int k = 0; k < n; k++) {
         const bt_key *key = &bt_case_keys[k];
         int depth;
         const char *name = open_sections(out, previous, key->name, &depth);

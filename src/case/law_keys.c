@@ -32,6 +32,7 @@ bool bt_keys_sound(bt_errors *err)
 
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err)
 {
+    const int before = bt_schema_added();
     bool all = true;
     for (int k = 0; k < n; k++) {
         const bt_law_key *own = &keys[k];
@@ -51,6 +52,7 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
         if (!added) free(name);
         all = all && added;
     }
+    if (!all) bt_schema_take_back(before); // all of them or none
     return all;
 }
 

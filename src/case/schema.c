@@ -16,11 +16,13 @@
 #include "bergtow/shape.h"
 
 #include "base/largest.h"
+#include "base/name.h"
 #include "base/suggest.h"
 #include "case/body_shapes.h"
 #include "case/value.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -503,9 +505,31 @@ static bool section_is_closed(const char *name)
     return !open && bt_schema_is_section(section);
 }
 
+int bt_schema_added(void) { return bt_n_case_keys - (int)(sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS); }
+
+void bt_schema_take_back(int added) { bt_n_case_keys -= bt_schema_added() - added; }
+
+/// One line of letters, digits and other signs: it stands in a comment behind the value.
+static bool is_line(const char *text)
+{
+    for (const char *p = text; *p; p++)
+        if ((unsigned char)*p < 0x20 || (unsigned char)*p == 0x7f) return false;
+    return true;
+}
+
+/// SECTION.NAME, both names, in a section that a case may have?
+static bool is_key(const char *key)
+{
+    char section[64];
+    const char *dot = strchr(key, '.');
+    if (!dot || dot - key >= (ptrdiff_t)sizeof section) return false;
+    snprintf(section, sizeof section, "%.*s", (int)(dot - key), key);
+    return strcmp(section, "base") && strcmp(section, "floes") && bt_is_name(section, 60) && bt_is_name(dot + 1, 60);
+}
+
 int bt_schema_add(const bt_key *k, bt_errors *err)
 {
-    const int place = bt_n_case_keys - (int)(sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS);
+    const int place = bt_schema_added();
     const size_t before = err->n, length = strlen(k->name);
     bt_key row = *k;
     bt_range r;
@@ -515,8 +539,11 @@ int bt_schema_add(const bt_key *k, bt_errors *err)
     if (place >= BT_EXTRA_KEYS)
         bt_errors_add(err, "%s: there is no room for more than %d added keys; raise BT_EXTRA_KEYS", k->name,
                       BT_EXTRA_KEYS);
-    else if (length > 60 || !strchr(k->name, '.'))
-        bt_errors_add(err, "%s: a key is SECTION.NAME, of at most 60 characters", k->name);
+    else if (length > 60 || !is_key(k->name))
+        bt_errors_add(err,
+                      "%s: a key is SECTION.NAME, of lower-case letters, digits and _, of at most 60 characters, and no "
+                      "section is base or floes",
+                      k->name);
     else if (bt_schema_find(bt_case_keys, bt_n_case_keys, k->name) >= 0)
         bt_errors_add(err, "%s: this key is there; choose another name", k->name);
     else if (section_is_closed(k->name))
@@ -525,7 +552,8 @@ int bt_schema_add(const bt_key *k, bt_errors *err)
         bt_errors_add(err, "%s: the range must be \"[least, most]\" or with ( and )", k->name);
     else if (!k->preset || k->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, k->preset, true, why))
         bt_errors_add(err, "%s: the default must be a number within the range, or none", k->name);
-    else if (!k->doc || strlen(k->doc) < 8) bt_errors_add(err, "%s: say in a sentence what it is", k->name);
+    else if (!k->doc || strlen(k->doc) < 8 || !is_line(k->doc))
+        bt_errors_add(err, "%s: say in a sentence, in one line, what it is", k->name);
     if (err->n > before) return -1;
     bt_case_keys[bt_n_case_keys++] = row;
     return place;

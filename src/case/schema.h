@@ -43,6 +43,9 @@ extern const int bt_n_study_keys;
 /// value. The texts stay the caller's and must outlive every case. offset and type are set here. −1 with the reason in
 /// err: no room, or the name, its section, preset, range or sentence will not do.
 int bt_schema_add(const bt_key *k, bt_errors *err);
+/// How many have been added, and: the last of them are taken back until so many are left.
+int bt_schema_added(void);
+void bt_schema_take_back(int added);
 
 /// Tables that do not fit together, a fault of the program: every case is refused with these texts. Takes them over.
 void bt_keys_fault(bt_errors *err);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a contact law must have to be added; bergtow/contact.h.
+#include <stdio.h>
 #include <string.h>
 
 #include "base/name.h"
@@ -26,6 +27,21 @@ static void check_numbers(const bt_contact_law *law, const char *name, bt_errors
                               law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
 }
 
+/// The series that it brings: its work and its numbers.
+static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
+{
+    char work[BT_MOST_LAW_NAME + sizeof "_work"];
+    snprintf(work, sizeof work, "%.*s_work", BT_MOST_LAW_NAME, name);
+    if (!bt_series_may_be || !bt_series_may_be(work, 1 + law->n_numbers, err)) return;
+    for (int k = 0; k < law->n_numbers; k++) {
+        const bt_contact_number *n = &law->numbers[k];
+        if (!n->name || !n->units || !*n->units || !n->description || strlen(n->description) < 8)
+            bt_errors_add(err, "contact law %s: its number %d needs name, units (\"1\" for a plain number) and a "
+                          "description", name, k + 1);
+        else bt_series_may_be(n->name, 1, err);
+    }
+}
+
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 {
     const size_t before = err->n;
@@ -43,6 +59,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
     if (bt_n_contact_laws() == BT_MAX_ADDED_LAWS)
         bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name,
                       BT_MAX_ADDED_LAWS);
+    if (err->n == before) check_series(law, name, err);
     if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
     bt_added_add(law); // there is room
     return BT_OK;

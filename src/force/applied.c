@@ -152,13 +152,23 @@ bool bt_force_is_applied(void)
     return false;
 }
 
+/// As much of a text as there is room for, up to the end of a character.
+static void copy_line(char *to, size_t room, const char *text)
+{
+    size_t n = strlen(text);
+    if (n >= room)
+        for (n = room - 1; n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80;) n--;
+    memcpy(to, text, n);
+    to[n] = '\0';
+}
+
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err)
 {
     slot *s = name ? find(name) : NULL;
     if (!s) {
         s = bt_alloc(1, sizeof *s);
         snprintf(s->name, sizeof s->name, "%s", name ? name : "");
-        snprintf(s->doc, sizeof s->doc, "%s", doc ? doc : "");
+        copy_line(s->doc, sizeof s->doc, doc ? doc : "");
         s->law = (bt_force_law){
             .name = s->name, .doc = s->doc, .rests = rests, .begin = begin, .add = add, .context = s};
         const bool fits = !name || strlen(name) < sizeof s->name;

@@ -55,6 +55,19 @@ __attribute__((constructor(101))) static void begin(void)
     bt_keys_fault(&err);
 }
 
+/// The series that it brings.
+static void check_series(const bt_force_law *law, const char *name, bt_errors *err)
+{
+    const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;
+    if (law->part_of && !bt_is_name(law->part_of, BT_MOST_LAW_NAME))
+        bt_errors_add(err, "force law %s: part_of \"%s\" is no name of lower-case letters, digits and _, at most 40",
+                      name, law->part_of);
+    if (!of || bt_force_series_find(of) >= 0 || !bt_series_may_be) return;
+    char series[BT_MOST_LAW_NAME + sizeof "_force"];
+    snprintf(series, sizeof series, "%.*s_force", BT_MOST_LAW_NAME, of);
+    bt_series_may_be(series, 1, err);
+}
+
 bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
@@ -70,6 +83,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
     if (bt_n_force_laws == BT_MAX_FORCE_LAWS)
         bt_errors_add(err, "force law %s: a program can have at most %d, and this one has them all; give an applied "
                       "force the name of one whose simulation has ended", name, BT_MAX_FORCE_LAWS);
+    if (err->n == before) check_series(law, name, err);
     if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;
     add_series_of(law);

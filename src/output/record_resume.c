@@ -18,6 +18,13 @@
 #include "output/record_parts.h"
 #include "base/checksum.h"
 
+/// By name: a program that goes on may have its series in another order.
+static const char *merged_name(int k, char name[BT_HISTORY_NAME])
+{
+    snprintf(name, BT_HISTORY_NAME, "merged/%s", bt_series(k)->name);
+    return name;
+}
+
 bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_errors *err)
 {
     if (r->comm->rank != 0) return BT_OK;
@@ -33,7 +40,8 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? r->n_series : 0, 1, r->merged);
+    for (int k = 0; k < r->n_series && r->n_merged > 0; k++)
+        bt_snapshot_add(s, merged_name(k, name), BT_ITEM_F64, 1, 1, &r->merged[k]);
     bt_impact_store_save(&r->impacts, s);
     return r->h5.status;
 }
@@ -139,6 +147,22 @@ static double missing_value(int k)
     const size_t laws = offsetof(bt_sample, laws);
     const bool of_law = q->offset >= laws && q->offset < laws + sizeof((bt_sample){0}.laws);
     return was_zero(q) || of_law ? 0 : NAN;
+}
+
+/// The entry under way.
+static void load_merged(bt_record *r, bt_snapshot *s)
+{
+    const char *all = "record/merged"; // of earlier versions
+    if (bt_snapshot_find(s, all)) {
+        bt_snapshot_take(s, all, BT_ITEM_F64, r->n_series, 1, r->merged);
+        return;
+    }
+    char name[BT_HISTORY_NAME];
+    for (int k = 0; k < r->n_series; k++) {
+        const bool maybe = k < bt_n_program_series() || was_zero(bt_series(k));
+        if (maybe && !bt_snapshot_find(s, merged_name(k, name))) r->merged[k] = missing_value(k);
+        else bt_snapshot_take(s, merged_name(k, name), BT_ITEM_F64, 1, 1, &r->merged[k]);
+    }
 }
 
 /// Entries 0 up to n of all series.
@@ -262,7 +286,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
     bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
-    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, r->n_series, 1, r->merged);
+    if (r->n_merged > 0) load_merged(r, s);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {

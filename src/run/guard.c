@@ -148,6 +148,10 @@ static void look_at(const bt_world *w, bt_idx k, const range *r, bt_totals *t)
     const bt_bodies *b = &w->bodies;
     const bt_cell *cell = &w->cells->cell[k];
     if (!cell->own) return;
+    for (bt_idx i = 0; i < cell->laws.n_memory; i++) {
+        const bt_memory *m = &cell->laws.memory[i];
+        if (!isfinite(m->value[0] + m->value[1] + m->value[2] + m->value[3])) t->most = bt_max(t->most, (double)m->a);
+    }
     for (bt_idx i = cell->first; i < cell->end; i++) {
         const bt_pose *p = &b->pose[i];
         const bt_vel *v = &b->vel[i];
@@ -188,8 +192,8 @@ void bt_guard_name(const bt_guard *g, const bt_world *w, bt_errors *err)
     if (found[0] >= 0) {
         body_name(g, w, (bt_gid)found[0], name);
         bt_errors_add(err,
-                      "step %" PRId64 ": %s has a pose or velocity that is not a number; "
-                      "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                      "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law remembers one "
+                      "of it; take a smaller run.dt, and check masses, stiffness and speeds of the case, and the law",
                       w->step, name);
     }
     if (found[1] >= 0) {

@@ -15,10 +15,18 @@
 // below them a bit for each signal
 static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50;
 
-static volatile sig_atomic_t stop_signal, save_signal;
+static volatile sig_atomic_t stop_signal, saves_asked;
 
 static void on_stop(int number) { stop_signal = number; }
-static void on_save(int number) { save_signal = number; }
+static void on_save(int number)
+{
+    (void)number;
+    saves_asked = (saves_asked + 1) & 0xffff;
+}
+
+// Of the process: the handlers stay from the first run that has them to the end of the last.
+static int users;
+static struct sigaction before_all[BT_N_CAUGHT];
 
 static const int caught[BT_N_CAUGHT] = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGUSR1};
 
@@ -41,25 +49,29 @@ void bt_halt_let_go(const struct sigaction before[BT_N_CAUGHT])
 
 void bt_halt_begin(bt_halt *h)
 {
-    stop_signal = save_signal = 0;
     h->last = bt_clock();
     h->looked = 0;
-    if (!h->deaf) bt_halt_catch(on_stop, on_save, h->before);
+    if (!h->deaf && users++ == 0) {
+        stop_signal = 0;
+        bt_halt_catch(on_stop, on_save, before_all);
+    }
+    h->saves_seen = saves_asked;
 }
 
 void bt_halt_end(bt_halt *h)
 {
+    if (h->deaf) return;
     if (h->stop_signal && stop_signal) *h->stop_signal = stop_signal;
-    if (!h->deaf) bt_halt_let_go(h->before);
+    if (--users == 0) bt_halt_let_go(before_all);
 }
 
 uint64_t bt_halt_look(bt_halt *h, int64_t step)
 {
     uint64_t bits = 0;
-    if (stop_signal) bits |= UINT64_C(1) << stop_signal;
+    if (!h->deaf && stop_signal) bits |= UINT64_C(1) << stop_signal;
     else if (h->stop_signal && *h->stop_signal) bits |= UINT64_C(1) << *h->stop_signal;
-    if (save_signal) {
-        save_signal = 0;
+    if (!h->deaf && h->saves_seen != saves_asked) {
+        h->saves_seen = saves_asked;
         bits |= save;
     }
     if (!h->first) return bits;

@@ -30,10 +30,11 @@ typedef struct bt_halt {
     bool first;             ///< this is rank 0
     // state
     double last, looked;    ///< bt_clock: of the last checkpoint, of the last look for the stop file
-    struct sigaction before[BT_N_CAUGHT];
+    int saves_seen;         ///< requests for a checkpoint by signal that have been met
 } bt_halt;
 
-/// From here on signals are kept for the next look; bt_halt_end brings back the handlers of before.
+/// From here on signals are kept for the next look; bt_halt_end of the last of several brings back the handlers of
+/// before the first.
 void bt_halt_begin(bt_halt *h);
 void bt_halt_end(bt_halt *h);
 

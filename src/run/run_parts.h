@@ -38,6 +38,7 @@ typedef struct bt_running {
     int64_t frames_due;      ///< frames by the interval, so far
     int64_t frames;          ///< frames taken, but for one that the end of --steps has added
     int64_t framed;          ///< step of the last frame, −1 = none in this call
+    bool edited;             ///< bodies were changed by hand since the last checkpoint
     bt_sample sample;        ///< of the last step
     double reference_speed;
     bt_run_totals totals;

@@ -113,7 +113,9 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
     if (status == BT_OK && r->comm->rank == 0 && r->until < 0) bt_folder_settle(r->o->dir);
     bt_snapshot_free(&s);
     bt_halt_saved(&r->halt);
-    return bt_comm_agree(r->comm, status);
+    status = bt_comm_agree(r->comm, status);
+    if (status == BT_OK) r->edited = false;
+    return status;
 }
 
 // --- taking up -------------------------------------------------------------------------------------------------------
@@ -153,11 +155,12 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
     return s->faulty ? BT_ERR_CASE : BT_OK;
 }
 
-/// Frames are by the interval, and a program may ask for others (bt_simulation_frame): one at most after each step.
+/// Frames are by the interval, and a program may ask for others (bt_simulation_frame), before a step as many as it has
+/// edits. That result.h5 holds them is seen where it is read.
 static void check_frames(const bt_running *r, bt_snapshot *s)
 {
     const int64_t step = bt_snapshot_int(s, "world/step"), first = bt_running_draws(r->c);
-    bt_snapshot_want(s, r->frames >= first && r->frames <= step + 1, "record/frames", -1,
+    bt_snapshot_want(s, r->frames >= first && r->frames <= BT_MOST_STEPS, "record/frames", -1,
                      "is no number of frames up to here");
     if (!first) {
         bt_snapshot_want(s, r->frames_due == 1, "run/frames_due", -1, "is not that of a run without frames");

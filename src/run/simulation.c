@@ -28,7 +28,6 @@ struct bt_simulation {
     bt_run_manner m;
     bt_status status;         ///< of the last step
     char *why;                ///< it failed, or NULL
-    bool edited;              ///< bodies were changed by hand since the last checkpoint
     bool *moved;              ///< [bodies] put elsewhere since the last step; NULL = none
     bool alone;               ///< no force was applied in any step
 };
@@ -135,8 +134,12 @@ static bt_status begin(bt_simulation *s, bt_errors *err)
     return status;
 }
 
-static bt_status check_threads(const bt_simulation_options *o, bt_errors *err)
+static bt_status check_numbers(const bt_simulation_options *o, bt_errors *err)
 {
+    if (o->n_set < 0 || (o->n_set > 0 && !o->set)) {
+        bt_errors_add(err, "n_set: %d is no number of texts in set", o->n_set);
+        return BT_ERR_USAGE;
+    }
     if (o->threads >= 0 && o->threads <= BT_MOST_THREADS) return BT_OK;
     bt_errors_add(err, "threads: %d cannot be had; give 1 to %d, or 0 for run.threads of the case or all cores",
                   o->threads, BT_MOST_THREADS);
@@ -156,7 +159,7 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
     const bt_comm *comm = bt_comm_world();
     bt_errors err = {0};
     bt_simulation *s = simulation_of(o);
-    bt_status status = check_threads(o, &err);
+    bt_status status = check_numbers(o, &err);
     if (status == BT_OK) status = read_case(&s->c, o, &err);
     if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, &err);
     status = bt_comm_agree(comm, status);
@@ -169,7 +172,7 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     bt_errors err = {0};
     bt_simulation *s = simulation_of(o);
     bt_resume k = {.lock = -1};
-    bt_status status = check_threads(o, &err);
+    bt_status status = check_numbers(o, &err);
     if (!o->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
     else if (o->path || o->text || o->n_set > 0)
         bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation", o->dir);
@@ -196,7 +199,7 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
 static bool keeps_failure(const bt_simulation *s)
 {
     const bool unsound = s->status == BT_ERR_NUMERIC && s->r.w->step > s->r.first_step;
-    return unsound && s->dir && s->alone && !s->edited;
+    return unsound && s->dir && s->alone && !s->r.edited;
 }
 
 static void forget_moved(bt_simulation *s)
@@ -276,9 +279,7 @@ bt_status bt_simulation_checkpoint(bt_simulation *s)
     if (s == stepping) return refuse_within();
     if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    const bt_status status = bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err);
-    if (status == BT_OK) s->edited = false;
-    return reported(status, &err);
+    return reported(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
 }
 
 bt_status bt_simulation_frame(bt_simulation *s)
@@ -358,11 +359,13 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
     return n;
 }
 
+#define NO_EDIT "a step has failed, or was the last: there is no next one for which a body could be changed"
+
 /// What a frame or a checkpoint has of this step is no longer the state.
 static bt_status edited(bt_simulation *s, bt_status status, bt_errors *err)
 {
     if (status == BT_OK) {
-        s->edited = true;
+        s->r.edited = true;
         s->r.framed = -1;
     }
     return reported(status, err);
@@ -372,6 +375,7 @@ bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, dou
 {
     bt_errors err = {0};
     if (s == stepping) return refuse_within();
+    if (s->status != BT_OK) return refuse(NO_EDIT);
     return edited(s, bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
@@ -380,6 +384,7 @@ static bool is_outside(double x, double low, double length) { return x < low || 
 bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw)
 {
     if (s == stepping) return refuse_within();
+    if (s->status != BT_OK) return refuse(NO_EDIT);
     bt_errors err = {0};
     const bt_params *p = &s->r.w->par;
     const double length = s->c.domain.length, width = s->c.domain.width;

@@ -6,6 +6,7 @@ import re
 import signal
 from concurrent.futures import ThreadPoolExecutor
 
+import h5py
 import numpy as np
 import pytest
 from harness import changed, quick, run
@@ -190,6 +191,42 @@ def test_what_goes_wrong_in_a_force_is_reported():
     with bergtow.Simulation(SHORT, forces={"mine": drives}):
         with pytest.raises(bergtow.BergtowError, match="belongs to a simulation that has not ended"):
             bergtow.Simulation(SHORT, forces={"mine": drives})
+
+
+def test_a_force_whose_series_is_taken_is_refused():
+    """Red: it acted, had no series, and sim["tow_force"] was that of the line. Its name stays free."""
+    for name in ("tow", "inertia"):
+        with pytest.raises(bergtow.BergtowError, match=f"{name}_force: there is a series of this name"):
+            stepped(SHORT, forces={name: lambda bodies: None})
+
+
+def test_what_a_force_has_filled_in_is_not_to_be_returned():
+    """Red: it counted twice."""
+    def both(bodies):
+        bodies.force[bodies.towed, 0] = -7
+        return bodies.force
+
+    with pytest.raises(ValueError, match="would count twice"):
+        stepped(SHORT, forces={"both": both})
+
+
+def test_a_case_without_bodies_has_forces_on_none(tmp_path):
+    case = {"run": {"dt": 0.1, "duration": 2}, "domain": {"length": 20, "width": 10, "ends": "periodic",
+            "sides": "periodic"}, "ice": {"concentration": 0}, "body": {"shape": "none"}}
+    seen = []
+    with bergtow.Simulation(case, threads=1, forces={"on_none": lambda bodies: seen.append(bodies.force.shape)}) as sim:
+        sim.step(2)
+    assert seen == [(0, 2)] * 2
+
+
+def test_texts_of_forces_end_with_a_character(tmp_path):
+    def long(bodies):
+        pass
+    long.__doc__ = "x" + "ä" * 150
+    with bergtow.Simulation(SHORT, tmp_path / "out", threads=1, forces={"wordy": long}) as sim:
+        sim.step(2)
+    with h5py.File(tmp_path / "out/result.h5") as f:
+        assert f["series/wordy_force"].attrs["description"].startswith("x" + "ä" * 90)
 
 
 OPEN = changed(SHORT, tow__speed=0.01, run__duration=30)

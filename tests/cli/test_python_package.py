@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The Python package on libbergtow: cases, results and ensembles as datasets, its page, its installation."""
+import copy
 import inspect
 import json
 import math
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -153,6 +155,25 @@ def test_a_result_is_a_dataset(tmp_path):
         assert math.isclose(float(d.ice_resistance.sel(time=slice(1, 3)).mean()), d.ice_resistance.values[9:30].mean())
         assert json.loads(d.attrs["summary"])["state_hash"] == there.hash
         assert d.other_body_name.values[0] == "towed body"
+
+
+def test_a_dataset_is_copied_pickled_and_cut_to_nothing(tmp_path):
+    """Red: TypeError, h5py objects cannot be pickled; ValueError of a selection without a hit."""
+    there = run(tmp_path, SHORT)
+    with bergtow.open_result(there.dir) as d:
+        ice = d.ice_resistance.values
+        for copied in (d.copy(deep=True).ice_resistance, copy.deepcopy(d.ice_resistance), d.ice_resistance.copy(),
+                       pickle.loads(pickle.dumps(d.ice_resistance))):
+            np.testing.assert_array_equal(copied.values, ice)
+        np.testing.assert_array_equal(d.sortby("time", ascending=False).ice_resistance.values, ice[::-1])
+        assert math.isfinite(float(d.tow_force.interp(time=1.05)))
+        none = np.flatnonzero(d.floe_area.values > 1e9)
+        assert d.floe_x.isel(floe=none).values.shape == (d.sizes["frame"], 0)
+        assert d.floe_x.where(d.floe_area > 1e9, drop=True).shape[1] == 0
+    with h5py.File(tmp_path / "other.h5", "w") as f:
+        f["x"] = 1
+    with pytest.raises(bergtow.BergtowError, match="holds no series of a run"):
+        bergtow.open_result(tmp_path / "other.h5")
 
 
 def test_a_large_result_opens_without_being_read(tmp_path):

@@ -104,6 +104,32 @@ static void a_key_is_a_key_of_the_case(void **state)
     bt_errors_free(&err);
 }
 
+/// What could not be read back from the resolved case is refused, and with it all keys of the call.
+static void keys_that_cannot_be_read_back_are_refused(void **state)
+{
+    (void)state;
+    const struct { const char *section, *name, *doc, *says; } bad[] = {
+        {"base", "x", "a key of the file", "no section is base"},
+        {"floes", "x", "a key of the list", "no section is base or floes"},
+        {"", "x", "a key of nothing", "SECTION.NAME"},
+        {"mine", "[a", "a key of brackets", "SECTION.NAME"},
+        {"mine", "x", "a key\nof two lines", "in one line"},
+        {"mine", "x", "a key \x01 of control", "in one line"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        const bt_law_key keys[] = {{"good", "m", "1", "[0, 2]", "a key that is good"},
+                                   {bad[k].name, "m", "1", "[0, 2]", bad[k].doc}};
+        bt_errors err = {0};
+        assert_false(bt_keys_add(bad[k].section, keys, 2, &err));
+        const char *last = err.n ? err.text[err.n - 1] : "-";
+        if (!strstr(last, bad[k].says)) fail_msg("%s: %s", bad[k].says, last);
+        bt_errors_free(&err);
+    }
+    bt_errors err = {0};
+    assert_true(bt_keys_add("mine", &(bt_law_key){"good", "m", "1", "[0, 2]", "a key that is good"}, 1, &err));
+    bt_errors_free(&err);
+}
+
 int main(void)
 {
     bt_errors err = {0};
@@ -114,6 +140,7 @@ int main(void)
         cmocka_unit_test(unknown_shapes_are_reported),
         cmocka_unit_test(what_will_not_do_is_refused),
         cmocka_unit_test(a_key_is_a_key_of_the_case),
+        cmocka_unit_test(keys_that_cannot_be_read_back_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
