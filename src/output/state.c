@@ -415,7 +415,7 @@ static void load_added_forces(bt_forces *f, bt_snapshot *s)
     if (s->err)
         bt_errors_add(s->err,
                       "%s: the run had %s, which a program had added (force laws, in this order); go on in one that "
-                      "adds the same in the same order",
+                      "adds the same in the same order, before any other: in a new process",
                       s->path, then);
     s->faulty = true;
 }
