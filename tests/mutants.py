@@ -760,7 +760,8 @@ MUTANTS = {
                         "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint", "cli/test_resume.py"], [
         ("if (h->wall > 0 && now - h->last >= h->wall) bits |= save;", "", "no checkpoint by the clock"),
         ("if (h->steps > 0 && step % h->steps == 0) bits |= save;", "", "no checkpoint by steps"),
-        ("        save_signal = 0;\n        bits", "        bits", "a checkpoint at every step after a signal"),
+        ("        h->saves_seen = saves_asked;\n        bits", "        bits",
+         "a checkpoint at every step after a signal"),
     ]),
 }
 

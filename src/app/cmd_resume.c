@@ -58,8 +58,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option resume_options[] = {
     {"threads", 't', "N", 0,
-     "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does not "
-     "depend on it", 0},
+     "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does "
+     "not depend on it", 0},
     {"steps", KEY_STEPS, "N", 0, "stop after N more steps", 0},
     {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},

@@ -12,7 +12,7 @@ enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append 
 bool bt_is_name(const char *s, int most);
 
 struct bt_errors;
-/// Can a law have `more` series, one of them of this name? Set by what keeps the series (output/quantity_registry.c),
+/// Can a law have `more` series, one of them of this name? Set by what keeps the series (output/quantity.c),
 /// which stands above the laws; NULL where nobody keeps any. Otherwise: why not, into err.
 extern bool (*bt_series_may_be)(const char *name, int more, struct bt_errors *err);
 

@@ -42,7 +42,8 @@ static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double
     a.beside = n > 0 && floe_size > 0;
     a.region = p->region;
     const double water = p->extent - p->ice;
-    a.water = a.beside && concentration > 0 && c->tow.mode != BT_TOW_NONE && water > BT_ARCH_WATER * floe_size ? water : 0;
+    const bool counts = a.beside && concentration > 0 && c->tow.mode != BT_TOW_NONE;
+    a.water = counts && water > BT_ARCH_WATER * floe_size ? water : 0;
     for (size_t k = 0; a.beside && !open && k < sizeof asked / sizeof *asked; k++)
         if (reaches(concentration, asked[k].concentration)) a.needed = asked[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);

@@ -195,8 +195,8 @@ static void check_sizes(const check *k)
     if (bt_check_sound(k, "ice.rafting.kappa ice.density water.density") && c->ice.rafting_kappa > 0 &&
         c->ice.density == c->water.density)
         bt_check_fault(k, "ice.rafting.kappa",
-                       "%g beside ice as heavy as water, %g kg/m3: sheets that do not float bear nothing at their edges; "
-                       "give ice.density, or 0 for rigid floes",
+                       "%g beside ice as heavy as water, %g kg/m3: sheets that do not float bear nothing at their "
+                       "edges; give ice.density, or 0 for rigid floes",
                        c->ice.rafting_kappa, c->ice.density);
     if (bt_case_reads_field(c) || c->ice.concentration == 0) return;
     if (bt_check_sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)

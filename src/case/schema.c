@@ -541,8 +541,8 @@ int bt_schema_add(const bt_key *k, bt_errors *err)
                       BT_EXTRA_KEYS);
     else if (length > 60 || !is_key(k->name))
         bt_errors_add(err,
-                      "%s: a key is SECTION.NAME, of lower-case letters, digits and _, of at most 60 characters, and no "
-                      "section is base or floes",
+                      "%s: a key is SECTION.NAME, of lower-case letters, digits and _, of at most 60 characters, and "
+                      "no section is base or floes",
                       k->name);
     else if (bt_schema_find(bt_case_keys, bt_n_case_keys, k->name) >= 0)
         bt_errors_add(err, "%s: this key is there; choose another name", k->name);

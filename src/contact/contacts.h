@@ -5,9 +5,9 @@
 //   speeds ─> margins ─> pair list of the cell (kept over many steps) ─> narrow phase ─> contacts, in sweep order
 //
 // What the result depends on is only this: a contact exists for every pair of an active cell whose gap (along the best
-// separating axis; of two corners that face each other their distance) is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
-// pairs are conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by
-// brute force).
+// separating axis; of two corners that face each other their distance) is at most the cell's margin. The pair list with
+// its skin, the cached axis and the skipping of far pairs are conservative shortcuts that cannot change it
+// (tests/unit/test_contacts.c holds them against all pairs by brute force).
 //
 // Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame,
 // rounded up to a power of √2; at least the slop, at most 16 mean floe sizes (space/margin.h).

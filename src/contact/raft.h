@@ -51,11 +51,11 @@
 // Between which bodies: floes of the field and by hand whose outlines are both convex. Not the towed body, walls and
 // fixed floes, which stand for structures, shores and grounded ice: ice does not slide over a deep hull. Nor a floe
 // whose freeboard, (1 − ρ_i/ρ_w) H, is more than the thickness of the other: the deck of the thicker one then
-// stands higher above the water than the thinner one is thick, and its side is a hull to it (H some 9 times h; assumed). A floe in convex parts stays rigid.
-// Such pairs crush where ice.crushing says so.
-// Several floes on one spot are treated pair by pair: N sheets of h make N(N − 1)/2 pairs, and (N h)² − N h² = N(N −
-// 1) h² is as many times what it is for two, so that the energy of a pile, and the sum of the pressures between its
-// layers, come out right; friction in a pile that is sheared from top to bottom is (N + 1)/3 times too much.
+// stands higher above the water than the thinner one is thick, and its side is a hull to it (H some 9 times h;
+// assumed). A floe in convex parts stays rigid. Such pairs crush where ice.crushing says so. Several floes on one spot
+// are treated pair by pair: N sheets of h make N(N − 1)/2 pairs, and (N h)² − N h² = N(N − 1) h² is as many times what
+// it is for two, so that the energy of a pile, and the sum of the pressures between its layers, come out right;
+// friction in a pile that is sheared from top to bottom is (N + 1)/3 times too much.
 #ifndef BERGTOW_RAFT_H
 #define BERGTOW_RAFT_H
 

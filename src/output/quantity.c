@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/name.h"
 #include "output/contact_quantities.h"
 #include "output/force_quantities.h"
 #include "output/quantity_registry.h"
@@ -32,6 +33,17 @@ int bt_n_added(void)
 }
 
 const bt_quantity *bt_added(int k) { return bt_registered(k); }
+
+/// For a law that is about to be registered, whose series are taken up when they are asked for first.
+static bool may_be(const char *name, int more, bt_errors *err)
+{
+    const size_t before = err->n;
+    bt_n_added(); // those of the laws before it
+    bt_registry_check(name, more, err);
+    return err->n == before;
+}
+
+__attribute__((constructor(101))) static void begin(void) { bt_series_may_be = may_be; }
 
 const bt_quantity *bt_series_find(const char *name)
 {

@@ -63,7 +63,7 @@ static char *in_words(const char *name)
     return words;
 }
 
-static void check_name(const char *name, int more, bt_errors *err)
+void bt_registry_check(const char *name, int more, bt_errors *err)
 {
     if (!bt_is_name(name, MOST_NAME))
         bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
@@ -71,26 +71,15 @@ static void check_name(const char *name, int more, bt_errors *err)
     else if (is_taken(name))
         bt_errors_add(err, "quantity %s: there is a series of this name; choose another", name);
     if (n_added + more > BT_MAX_ADDED)
-        bt_errors_add(err, "quantity %s: a program can add %d of them, and they are all there; take the name of a force "
-                      "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
+        bt_errors_add(err, "quantity %s: a program can add %d of them, and they are all there; take the name of a "
+                      "force whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
 }
-
-/// For a law that is about to be registered, whose series are taken up when they are asked for first.
-static bool may_be(const char *name, int more, bt_errors *err)
-{
-    const size_t before = err->n;
-    bt_n_added(); // those of the laws before it
-    check_name(name, more, err);
-    return err->n == before;
-}
-
-__attribute__((constructor(101))) static void begin(void) { bt_series_may_be = may_be; }
 
 bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = q->name ? q->name : "";
-    check_name(name, 1, err);
+    bt_registry_check(name, 1, err);
     if (!q->units || !*q->units)
         bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
     if (!q->description || strlen(q->description) < 8)

@@ -8,4 +8,7 @@
 int bt_n_registered(void);
 const bt_quantity *bt_registered(int k);
 
+/// Why there can be no series of this name, or not `more` of them, into err.
+void bt_registry_check(const char *name, int more, bt_errors *err);
+
 #endif

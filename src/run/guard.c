@@ -192,8 +192,9 @@ void bt_guard_name(const bt_guard *g, const bt_world *w, bt_errors *err)
     if (found[0] >= 0) {
         body_name(g, w, (bt_gid)found[0], name);
         bt_errors_add(err,
-                      "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law remembers one "
-                      "of it; take a smaller run.dt, and check masses, stiffness and speeds of the case, and the law",
+                      "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law remembers "
+                      "one of it; take a smaller run.dt, and check the law, and masses, stiffness and speeds of the "
+                      "case",
                       w->step, name);
     }
     if (found[1] >= 0) {

@@ -536,7 +536,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     add_walls(c, w, r->names + n);
     bool held[2];
     held_ice(c, f->concentration, held);
-    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes, held); // floes by hand are no ice beside a field
+    // floes by hand are no ice beside a field
+    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes, held);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     *out = w;

@@ -334,7 +334,8 @@ def test_loose_ice_between_end_walls_drifts_and_dense_ice_does_not(tmp_path):
 
 
 def test_a_floe_by_hand_is_no_undisturbed_ice_beside_a_field(tmp_path):
-    case = changed(DRIVEN, domain__ends="periodic", air__wind_x=0, run__duration=60, tow__ramp=0, output__window_start=0)
+    case = changed(DRIVEN, domain__ends="periodic", air__wind_x=0, run__duration=60, tow__ramp=0,
+                   output__window_start=0)
     case["floes"] = [{"shape": "rectangle", "length": 10, "width": 10, "x": 250, "y": 0, "vx": 2}]
     case["ice"]["x_max"] = 200
     r = run(tmp_path, case, name="thrown")

@@ -322,8 +322,8 @@ def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
 
 @pytest.mark.slow
 def test_a_checkpoint_that_is_due_counts_and_no_body_is_changed_after_a_failure(tmp_path):
-    """Red: no failure.h5 after a change by hand, though a checkpoint by the interval had come since; and a body that was
-    changed after the failed step took failure.h5 away that was promised."""
+    """Red: no failure.h5 after a change by hand, though a checkpoint by the interval had come since; and a body that
+    was changed after the failed step took failure.h5 away that was promised."""
     case = changed(CLOSING, output__checkpoint_steps=5)
     with pytest.raises(bergtow.BergtowError, match="writes the state before that step") as raised:
         with bergtow.Simulation(case, tmp_path / "out", threads=1) as sim:

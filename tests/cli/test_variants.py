@@ -105,7 +105,8 @@ def test_a_study_with_a_key_replaced_is_compared_field_by_field(tmp_path):
     assert "| concentration 50 % | -50 (-50 to -50) | +100 (+100 to +100) |" in lines
     assert "| concentration 80 % | -50 (-50 to -50) | – |" in lines
     assert "| concentration 80 % | 15.0 | 15.0 | 15.0 |" in lines
-    assert "begun: 4 of 6 fields, 0 of 160 steps not converged, overlap at most 0.3 % of a floe, but for rafting" in lines
+    assert ("begun: 4 of 6 fields, 0 of 160 steps not converged, overlap at most 0.3 % of a floe, but for rafting"
+            in lines)
     assert (tmp_path / "changes.png").stat().st_size > 10000
     other = changes("base", "more", cwd=tmp_path)
     assert other.returncode == 4 and "has other fields than the first" in other.stderr

@@ -121,7 +121,7 @@ static void what_will_not_do_is_refused(void **state)
     } bad[] = {
         {{.name = "tilt", .doc = "a law of that name", .add = spring}, "there is a force of this name"},
         {{.name = "drag", .doc = "a sum of that name", .add = spring}, "there is a force of this name"},
-        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: there is a series of this name"},
+        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: there is a series"},
         {{.name = "share", .doc = "a part of no name", .add = spring, .part_of = "My Sum!"}, "part_of \"My Sum!\""},
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without function"}, "no function"},
