@@ -35,7 +35,7 @@ def smoothing(run):
     length = 0.0 if run.towed is None else np.ptp(run.bodies[run.towed].vertices[:, 0])
     wish = length / speed if speed > 0 and length > 0 else (time[-1] - time[0]) / 50
     samples = int(np.clip(wish / step, min(10, len(time) // 4), max(len(time) // 20, 1)))
-    return samples, samples * step
+    return samples, (2 * (max(samples, 1) // 2) + 1) * step  # as many as running_mean takes
 
 
 def _clip_peaks(axes, raw, smooth, marks, factor, top):

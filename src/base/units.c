@@ -197,7 +197,8 @@ int bt_units_format(double value, bt_unit kind, char *out, size_t size)
 const char *bt_force_text(char out[32], double newton)
 {
     const double size = fabs(newton);
-    if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
+    if (isnan(newton)) snprintf(out, 32, "–");
+    else if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
     else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
     else snprintf(out, 32, "%#.4g N", newton);
     return out;

@@ -77,8 +77,10 @@ static void print_forces(const bt_summary *s, const bt_case *c)
         printf("  window              none: %s\n", w->reason);
         return;
     }
-    printf("  window              %g to %g s (%s), %s; %.3g independent samples, correlation time %.3g s\n", w->start,
-           w->end, w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff, w->correlation_time);
+    printf("  window              %g to %g s (%s), %s; %.3g independent samples", w->start, w->end,
+           w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff);
+    if (isfinite(w->correlation_time)) printf(", correlation time %.3g s", w->correlation_time);
+    printf("\n");
     if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
     printf("  %s\n",
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
