@@ -44,6 +44,8 @@ static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double
     const double water = p->extent - p->ice;
     const bool counts = a.beside && concentration > 0 && c->tow.mode != BT_TOW_NONE;
     a.water = counts && water > BT_ARCH_WATER * floe_size ? water : 0;
+    const double gap = c->domain.length - (c->ice.x_max - c->ice.x_min);
+    a.gap = counts && c->domain.ends == BT_BOUND_MOVING && gap > BT_ARCH_WATER * floe_size ? gap : 0;
     for (size_t k = 0; a.beside && !open && k < sizeof asked / sizeof *asked; k++)
         if (reaches(concentration, asked[k].concentration)) a.needed = asked[k].widths;
     const double way = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration);
@@ -105,6 +107,12 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
                       "pushed out into it, and the resistance is that of a strip of ice; leave both keys out to fill "
                       "the domain, unless that is meant",
                       a->region, a->water);
+    if (a->gap > 0)
+        bt_errors_add(warnings,
+                      "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and is repeated so: "
+                      "the body comes into open water again and again, and neither a mean nor its verdict knows; leave "
+                      "both keys out",
+                      a->gap);
     if (a->unbounded)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "

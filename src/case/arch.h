@@ -44,6 +44,7 @@ typedef struct bt_arch {
                           ///< the sides, or it is too loose to matter
     const char *region;   ///< keys of the ends of the ice across the tow
     double water;         ///< open water beside the ice across the tow, m; 0 = none worth a word
+    double gap;           ///< open water between the repetitions of the ice of a moving window, m; likewise
     bool beside;          ///< there is a body, and ice beside it
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush

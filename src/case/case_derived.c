@@ -124,7 +124,7 @@ double bt_case_area_by_hand(const bt_case *c)
 
 double bt_case_expected_floes(const bt_case *c)
 {
-    if (bt_case_reads_field(c)) return 0;
+    if (bt_case_reads_field(c) || c->ice.concentration == 0) return 0; // a power law has no limits then
     return bt_max(0, bt_case_made_area(c) / (BT_PI / 4 * mean_square_size(c)));
 }
 

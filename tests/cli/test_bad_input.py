@@ -271,6 +271,12 @@ def test_a_result_is_not_replaced_unasked(folder):
     assert old.read_bytes()[512:516] == b"\x89HDF"
 
 
+def test_open_water_needs_no_limits_of_a_law(folder):
+    """Red: "about nan floes and 600 steps need some nan GB"."""
+    result = call("check", "good.yml", "--set", "ice.concentration=0", "--set", "ice.size_law=power", cwd=folder)
+    assert result.returncode == DONE and b"nan" not in result.stdout, result.stderr
+
+
 # ---- the command line ----
 
 USAGES = {

@@ -146,10 +146,18 @@ static void water_beside_the_ice_is_told(void **state)
     assert_int_equal(said.n, 1);
     assert_non_null(strstr(said.text[0], "ice.y_min, ice.y_max: 5 m of open water"));
     bt_errors_free(&said);
+    said = (bt_errors){0};
     c.tow.direction = c.body.yaw = BT_PI / 2;
     assert_true(bt_arch_of(&c, 0.3, 0.5).water == 190);
+    assert_true(bt_arch_of(&c, 0.3, 0.5).gap == 0);
+    c.domain.ends = BT_BOUND_MOVING; // which repeats the ice, and the water between it
+    assert_true(bt_arch_of(&c, 0.3, 0.5).gap == 190);
+    const bt_arch moving = bt_arch_of(&c, 0.3, 0.5);
+    bt_arch_warn(&moving, &said);
+    assert_non_null(strstr(said.text[said.n - 1], "all but 190 m of the moving window"));
+    bt_errors_free(&said);
     c.tow.mode = BT_TOW_NONE;
-    assert_true(bt_arch_of(&c, 0.3, 0.5).water == 0);
+    assert_true(bt_arch_of(&c, 0.3, 0.5).water == 0 && bt_arch_of(&c, 0.3, 0.5).gap == 0);
 }
 
 int main(void)
