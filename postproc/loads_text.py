@@ -249,8 +249,8 @@ CUT = 0.9  # of the hours: where the blocks have less, it is said
 
 
 def cut(name, f, hours):
-    """["of NAME, blocks of one length have 12 of 20 h, and none is of 3 fields"] of a fit that leaves out more than a
-    little; [] of others. name: of what, hours: of all fields."""
+    """["NAME: 12 of 20 h, and none of 3 fields"] of a fit by blocks that leaves out more than a little; [] of others.
+    name: of what, hours: of all fields."""
     used, none = f.get("hours", hours), f.get("without_block", 0)
     if used >= CUT * hours and not none:
         return []

@@ -19,10 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import command  # noqa: E402
 import style  # noqa: E402
+import text_table  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 from ensemble_read import Ensemble, reading, short_key, worded  # noqa: E402
 from plot_variants import relative_change  # noqa: E402
 from stat_mean import t_interval  # noqa: E402
+from text_table import number  # noqa: E402
 
 import matplotlib.pyplot as plt  # noqa: E402
 
@@ -82,33 +84,25 @@ def label(e, c):
     return ", ".join(worded(key, c.values[key], c.units[key]) for key in varied(e)) or c.label
 
 
-def table(head, lines):
-    print("| " + " | ".join(head) + " |\n|" + " --- |" + " ---: |" * (len(head) - 1))
-    for line in lines:
-        print("| " + " | ".join(line) + " |")
-    print()
-
-
-def report(studies):
+def report(studies, of):
+    """of: rows() of each study."""
     base = studies[0][1]
-    factor, unit = style.scale([m for _, e in studies for m in rows(base, e)[:, 0]], "N")
+    factor, unit = text_table.scale([m for r in of for m in r[:, 0]], "N")
     names, labels = [name for name, _ in studies], [label(base, c) for c in base.conditions()]
-    of = [rows(base, e) for _, e in studies]
 
-    def number(x, text):
-        return text.replace("nan", "–") if np.isfinite(x) else "–"
+    def show(heading, names, cells):
+        """cells: of each study those of its conditions."""
+        lines = [[words, *(some[k] for some in cells)] for k, words in enumerate(labels)]
+        print(f"{heading}\n\n{text_table.table(['condition', *names], lines, True)}\n")
 
-    print(f"mean ± standard error over the fields, {unit}\n")
-    table(["", *names], [[words, *(number(r[k, 0], f"{r[k, 0] / factor:.3g} ± {r[k, 1] / factor:.2g}") for r in of)]
-                         for k, words in enumerate(labels)])
-    print("change of the mean, % (95 %)\n")
-    table(["", *names[1:]], [[words, *(number(c[k], f"{c[k]:+.0f} ({c[k] - h[k]:+.0f} to {c[k] + h[k]:+.0f})")
-                                       for c, h in (r[:, 2:4].T for r in of[1:]))]
-                             for k, words in enumerate(labels)])
-    print(f"largest mean over a step in any field, {unit}\n")
-    peaks = [[np.max(e.summary["peak_ice_resistance_n"][c.finished], initial=-np.inf) / factor for c in e.conditions()]
-             for _, e in studies]
-    table(["", *names], [[words, *(number(p[k], style.short(p[k])) for p in peaks)] for k, words in enumerate(labels)])
+    show(f"mean ± standard error over the fields, {unit}", names,
+         [[f"{number(m / factor)} ± {number(error / factor, 2)}" for m, error in r[:, :2]] for r in of])
+    show("change of the mean, % (95 %)", names[1:],
+         [[f"{c:+.0f} ({c - h:+.0f} to {c + h:+.0f})" if np.isfinite(c) else "–" for c, h in r[:, 2:4]]
+          for r in of[1:]])
+    show(f"largest mean over a step in any field, {unit}", names,
+         [[number(max(e.summary["peak_ice_resistance_n"][c.finished], default=np.nan) / factor) for c in e.conditions()]
+          for _, e in studies])
     for name, e in studies:
         print(f"{name}: {soundness_of(e)}")
 
@@ -134,18 +128,16 @@ def places(base):
     return x, np.arange(len(x)), "", [label(base, c) for c in conditions]
 
 
-def draw(studies):
-    """Means and their changes over what was varied."""
+def draw(studies, of):
+    """Means and their changes over what was varied; of: rows() of each study."""
     base = studies[0][1]
     x, order, axis, texts = places(base)
-    line = "" if texts else None  # between conditions of several kinds there is none
     figure, (above, below) = plt.subplots(2, 1, figsize=(8.4, 8.2), sharex=True, height_ratios=(3, 2))
     figure.subplots_adjust(left=0.11, right=0.97, top=0.9, bottom=0.08, hspace=0.08)
-    of = [rows(base, e) for _, e in studies]
-    factor, unit = style.scale(np.concatenate([r[:, 0] for r in of]), "N")
+    factor, unit = text_table.scale(np.concatenate([r[:, 0] for r in of]), "N")
     shift = 0.004 * max(np.ptp(x), 1.0) * (np.arange(len(studies)) - (len(studies) - 1) / 2)
     for (name, _), r, (colour, dashes), dx in zip(studies, of, LINES, shift):
-        look = {"color": colour, "linestyle": dashes if line is None else line, "marker": "o", "markersize": 3.5,
+        look = {"color": colour, "linestyle": "" if texts else dashes, "marker": "o", "markersize": 3.5,
                 "linewidth": 1.4, "capsize": 2}
         r = r[order]
         above.errorbar(x[order] + dx, r[:, 0] / factor, r[:, 4] / factor, label=name, **look)
@@ -161,9 +153,7 @@ def draw(studies):
     if texts:
         below.set_xticks(x, texts, rotation=30, ha="right", fontsize=8)
         figure.subplots_adjust(bottom=0.22)
-    figure.text(0.11, 0.955, base.title, fontsize=12)
-    figure.text(0.11, 0.925, f"the same fields with one value changed; against \"{studies[0][0]}\"; bars: 95 %",
-                fontsize=9, color=style.FAINT)
+    style.head(figure, base.title, f"the same fields with one value changed; against \"{studies[0][0]}\"; bars: 95 %")
     return figure
 
 
@@ -182,8 +172,9 @@ def main():
         p.error(f"at most {len(LINES)} studies")
     for _, e in studies[1:]:
         must_match(studies[0][1], e)
-    report(studies)
-    command.save(draw(studies), a.output, a.force)
+    of = [rows(studies[0][1], e) for _, e in studies]
+    report(studies, of)
+    command.save(draw(studies, of), a.output, a.force)
 
 
 if __name__ == "__main__":

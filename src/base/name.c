@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-bool (*bt_series_may_be)(const char *name, int more, struct bt_errors *err);
+bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 
 bool bt_is_name(const char *s, int most)
 {

@@ -3,7 +3,7 @@
 #ifndef BERGTOW_NAME_H
 #define BERGTOW_NAME_H
 
-#include <stdbool.h>
+#include "bergtow/base.h"
 
 enum { BT_LONGEST_KEY = 64 };   ///< bytes of a name of a key with its end
 enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append a word to it, and 48 fit
@@ -11,10 +11,9 @@ enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append 
 /// Lower-case letters, digits and _, beginning with no digit, at most `most` of them.
 bool bt_is_name(const char *s, int most);
 
-struct bt_errors;
 /// Can a law have `more` series, one of them of this name? Set by what keeps the series (output/quantity.c),
 /// which stands above the laws; NULL where nobody keeps any. Otherwise: why not, into err.
-extern bool (*bt_series_may_be)(const char *name, int more, struct bt_errors *err);
+extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 
 /// The next of names with blanks between them, such as those of keys, cut to its room; false after the last.
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);

@@ -100,8 +100,8 @@ def test_a_study_with_a_key_replaced_is_compared_field_by_field(tmp_path):
     result = changes("base", "smooth=half", "begun", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     lines = result.stdout.splitlines()
-    assert "| concentration 50 % | 2 ± 0.58 | 1 ± 0.29 | 4 ± 1.2 |" in lines
-    assert "| concentration 80 % | 20 ± 5.8 | 10 ± 2.9 | 60 ± – |" in lines
+    assert "| concentration 50 % | 2.00 ± 0.58 | 1.00 ± 0.29 | 4.00 ± 1.2 |" in lines
+    assert "| concentration 80 % | 20.0 ± 5.8 | 10.0 ± 2.9 | 60.0 ± – |" in lines
     assert "| concentration 50 % | -50 (-50 to -50) | +100 (+100 to +100) |" in lines
     assert "| concentration 80 % | -50 (-50 to -50) | – |" in lines
     assert "| concentration 80 % | 15.0 | 15.0 | 15.0 |" in lines
