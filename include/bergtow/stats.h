@@ -47,10 +47,12 @@ enum { BT_STATS_STARTS = 4096 }; ///< starts of a window that are looked at, at 
 /// most.
 int64_t bt_stats_start_step(int64_t n);
 
-/// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the
-/// variance of the mean of batches of 5, searched over the first half of what follows `first` in steps of
-/// bt_stats_start_step(n - first). Returns an index in [first, bt_stats_last_start(n, first)].
-int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first);
+/// Start of the steady window of x[n]: that of MSER-5 (White 1997, Simulation 69), the truncation point that minimises
+/// the variance of the mean of batches of 5, searched over the first half of what follows `first` in steps of
+/// bt_stats_start_step(n - first); but only where what it cuts off is another state than the rest, in a rank test that
+/// single large values do not decide, and where their means differ by more than `material` of the rest's: else `first`.
+/// Returns an index in [first, bt_stats_last_start(n, first)].
+int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material);
 
 /// The last start that it looks at: a minimum there is the end of the search, and no minimum of the series.
 int64_t bt_stats_last_start(int64_t n, int64_t first);

@@ -41,6 +41,7 @@
 #define TREND_WAVES 6
 #define TREND_FACTOR 1.95
 #define BATCH 5
+#define ACCEPT 3.2
 
 /// Mean in two passes: the second takes the rounding of the first out.
 static double mean_of(const double *x, int64_t n)
@@ -168,10 +169,41 @@ int64_t bt_stats_last_start(int64_t n, int64_t first)
     return first + (n - first) / 2 / step * step;
 }
 
+/// Ranks of z[count] from 1 on, equal ones with their mean rank.
+static void ranks_of(const double *z, int count, double rank[BATCHES])
+{
+    for (int k = 0; k < count; k++) {
+        int below = 0, equal = 0;
+        for (int i = 0; i < count; i++) below += z[i] < z[k], equal += z[i] == z[k];
+        rank[k] = below + 0.5 * (equal + 1);
+    }
+}
+
+/// Is what x[n] has before `start` another state than the rest, and does it matter (stats.h)?
+static bool is_transient(const double *x, int64_t n, int64_t start, double material)
+{
+    double z[BATCHES], d[BATCHES], mean[2] = {0};
+    const double cut = mean_of(x, start), rest = mean_of(x + start, n - start);
+    if (n < BT_TREND_LEAST || !(fabs(cut - rest) > material * fabs(rest))) return false;
+    const int count = batches_of(x, n, rest, z), round = (int)((count * start + n / 2) / n), a = round < 1 ? 1 : round;
+    ranks_of(z, count, d);
+    for (int k = 0; k < count; k++) mean[k >= a] += d[k] / (k < a ? a : count - a);
+    for (int k = 0; k < count; k++) d[k] -= mean[k >= a];
+    const double between = mean[0] - mean[1], error = variance_of_batches(d, count, 2) * (1.0 / a + 1.0 / (count - a));
+    return between * between > ACCEPT * ACCEPT * error && (between > 0) == (cut > rest);
+}
+
 // MSER(d) = Σ_{j>=d} (Y_j − mean_d)² / (k − d)² over k batch means Y_j: the squared standard error that the batches
 // from d on would have if they were independent. Backwards recursion (Welford) over d, so one pass. The minimum is
 // searched in the first half of what follows `first` only: near the end few batches agree by chance.
-int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first)
+//
+// Of a steady series with rare large values (floes met one by one) the minimum lies just after the last large one in
+// its first half, by choice of the data: the mean of the rest is then low, by a third in 2 % ice. So the start is taken
+// only where a second test, which large values cannot decide, finds another state before it: the rank sum of BATCHES
+// batches (Wilcoxon), its variance with the correlation of neighbours. A test on the values themselves with their own
+// variances halves that error at best. With ACCEPT = 3.2: −1.7, −2.1, −2.2, −0.8 % in 200 fields each of 2, 5, 10 and
+// 20 % ice, while of the rise by 23 % with which tows in 95 % ice begin 7 % are left, as by MSER alone.
+int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material)
 {
     if (first < 0) first = 0;
     if (first >= n) return first;
@@ -193,5 +225,5 @@ int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first)
             start = at;
         }
     }
-    return start;
+    return start > first && is_transient(x + first, n - first, start - first, material) ? start : first;
 }

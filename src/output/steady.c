@@ -70,7 +70,7 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
         if (!is_there(x, earliest, h->n)) continue;
-        const int64_t start = bt_stats_steady_start(x, h->n, earliest);
+        const int64_t start = bt_stats_steady_start(x, h->n, earliest, BT_STEADY_MATERIAL);
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
         if (start > earliest && start == bt_stats_last_start(h->n, earliest)) settles = reported[k].name;

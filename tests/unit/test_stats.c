@@ -175,8 +175,8 @@ static void constant_series_have_no_error(void **s)
     for (int i = 0; i < 1000; i++) x[i] = 0.1;
     const bt_mean m = bt_stats_mean(x, 1000);
     assert_true(m.mean == 0.1 && m.sd == 0 && m.se == 0 && m.tau == 0.5 && m.n_eff == 1000);
-    assert_int_equal(bt_stats_steady_start(x, 1000, 0), 0);
-    assert_int_equal(bt_stats_steady_start(x, 1000, 300), 300);
+    assert_int_equal(bt_stats_steady_start(x, 1000, 0, 0.02), 0);
+    assert_int_equal(bt_stats_steady_start(x, 1000, 300, 0.02), 300);
 }
 
 static void short_series(void **s)
@@ -189,8 +189,8 @@ static void short_series(void **s)
     assert_true(m.mean == 1 && isnan(m.sd) && isnan(m.se) && m.n == 1);
     m = bt_stats_mean(x, 2);
     assert_true(m.mean == 2.5 && fabs(m.sd - sqrt(4.5)) < 1e-15 && fabs(m.se - 1.5) < 1e-15);
-    for (int n = 0; n < 3; n++) assert_int_equal(bt_stats_steady_start(x, n, 0), 0);
-    assert_int_equal(bt_stats_steady_start(x, 2, 5), 5);
+    for (int n = 0; n < 3; n++) assert_int_equal(bt_stats_steady_start(x, n, 0, 0.02), 0);
+    assert_int_equal(bt_stats_steady_start(x, 2, 5, 0.02), 5);
 }
 
 static void alternating_series_keep_an_error_above_zero(void **s)
@@ -238,17 +238,17 @@ static void the_transient_is_cut(void **s)
         ar1(x, N, 0.5, &state);
         // A rise from −20 to 0 over the first 400 samples, in a noise of unit size.
         for (int i = 0; i < TRANSIENT; i++) x[i] += -20.0 * (TRANSIENT - i) / TRANSIENT;
-        const int64_t start = bt_stats_steady_start(x, N, 0);
+        const int64_t start = bt_stats_steady_start(x, N, 0, 0.02);
         assert_in_range(start, TRANSIENT - 60, TRANSIENT + 300);
         assert_true(fabs(bt_stats_mean(x + start, N - start).mean) < 0.25);
     }
     // Told to begin later, it never goes back; and it never looks beyond the middle.
-    assert_true(bt_stats_steady_start(x, N, 700) >= 700);
+    assert_true(bt_stats_steady_start(x, N, 700, 0.02) >= 700);
     for (int i = 0; i < N; i++) x[i] = i;
-    assert_in_range(bt_stats_steady_start(x, N, 0), N / 2 - 5, N / 2);
+    assert_in_range(bt_stats_steady_start(x, N, 0, 0.02), N / 2 - 5, N / 2);
     // The middle of what follows: a long ramp must not leave nothing to search.
-    assert_in_range(bt_stats_steady_start(x, N, 1200), 1600 - 5, 1600);
-    assert_in_range(bt_stats_steady_start(x, N, 1800), 1900 - 5, 1900);
+    assert_in_range(bt_stats_steady_start(x, N, 1200, 0.02), 1600 - 5, 1600);
+    assert_in_range(bt_stats_steady_start(x, N, 1800, 0.02), 1900 - 5, 1900);
 }
 
 /// A series that settles to its end has its minimum at the last start, however far apart the starts lie.
@@ -261,7 +261,7 @@ static void the_end_of_the_search_is_known(void **s)
         for (int64_t i = 0; i < n; i++) x[i] = exp(-2.0 * (double)i / (double)n);
         for (int64_t first = 0; first < n; first += 3 * n / 7) {
             const int64_t last = bt_stats_last_start(n, first);
-            assert_int_equal(bt_stats_steady_start(x, n, first), last);
+            assert_int_equal(bt_stats_steady_start(x, n, first, 0.02), last);
             assert_in_range(last, first + (n - first) / 2 - bt_stats_start_step(n - first), first + (n - first) / 2);
         }
         free(x);
@@ -283,7 +283,7 @@ static void starts_of_a_long_series_are_few(void **s)
     uint64_t state = 7;
     ar1(x, N, 0.5, &state);
     for (int i = 0; i < N / 7; i++) x[i] += 10;
-    const int64_t start = bt_stats_steady_start(x, N, FROM);
+    const int64_t start = bt_stats_steady_start(x, N, FROM, 0.02);
     assert_in_range(start, N / 7, N / 7 + 40);
     assert_int_equal((start - FROM) % 20, 0);
     free(x);
