@@ -27,7 +27,7 @@ enum {
     BT_MOST_COMPLAINTS = 200,          ///< errors of one case that are reported
     BT_MOST_THREADS = 1024,            ///< of a rank
     BT_MOST_FLOES = 20000000,          ///< about 40 GB; also keeps bt_idx far from its limit
-    BT_MOST_STEPS = 100000000,         ///< the summary keeps 184 bytes of each
+    BT_MOST_STEPS = 100000000,         ///< the summary keeps 192 bytes of each
     BT_MOST_FRAMES = 1000000,
     BT_MOST_ROWS = 2000000,            ///< of a CSV table
     BT_MOST_RING = 10000,              ///< vertices of one outline before it is simplified or refused

@@ -39,6 +39,7 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_IN_ICE_Y, "body_in_ice_y", body_in_ice_y),
     COLUMN(BT_COL_VX, "body_vx", body_vx),
     COLUMN(BT_COL_VY, "body_vy", body_vy),
+    COLUMN(BT_COL_YAW, "body_yaw", body_yaw),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)

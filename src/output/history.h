@@ -32,10 +32,11 @@ typedef enum bt_column {
     BT_COL_IN_ICE_Y,
     BT_COL_VX, ///< over ground
     BT_COL_VY,
+    BT_COL_YAW,
     BT_N_COLUMNS
 } bt_column;
 
-/// What the summary keeps of every step, whatever output.sample_every says: 184 bytes a step.
+/// What the summary keeps of every step, whatever output.sample_every says: 192 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity

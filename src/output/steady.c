@@ -49,13 +49,23 @@ static int64_t first_at_or_after(const bt_history *h, double time)
     return i;
 }
 
-/// A series that the run has from step `first` to its end; one that begins or ends within, as the tension of a line
-/// that parts, has no mean.
+/// A series that the run has from step `first` to its end.
 static bool is_there(const double *x, int64_t first, int64_t n)
 {
     for (int64_t i = first; i < n; i++)
         if (isnan(x[i])) return false;
     return n > first;
+}
+
+/// Of a branch that has parted only the peaks are left: its mean is one of tension and zeros, or of zeros alone.
+static bool has_parted(const bt_run_totals *t, bt_reported_series k)
+{
+    bool parted = false;
+    if (k != BT_REPORTED_TENSION_1 && k != BT_REPORTED_TENSION_2) return false;
+    for (int64_t i = 0; t->events && i < t->events->n; i++)
+        parted |= t->events->event[i].kind == BT_EVENT_LINE_BROKEN &&
+                  t->events->event[i].subject == 1 + (int)k - BT_REPORTED_TENSION_1;
+    return parted;
 }
 
 /// Index of the window's first step; h->n without a window.
@@ -84,22 +94,47 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     return first;
 }
 
-static void reduce(bt_steady *s, const bt_history *h)
+/// How many equal stretches of contact the mean of x[n] is worth: with R_i the sum over a stretch between two steps of
+/// next to nothing, (Σ R_i)² / Σ R_i². A stretch longer than the correlation lasts is cut into pieces of that length.
+/// Infinite for a series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros: their number
+/// says nothing of a mean that is made of three collisions.
+static double stretches(const double *x, int64_t n, double mean, double correlation)
+{
+    double sum = 0, squares = 0, piece = 0;
+    int64_t length = 0;
+    bool pause = false;
+    for (int64_t i = 0; i <= n; i++) {
+        const bool rest = i == n || fabs(x[i]) <= BT_STEADY_MATERIAL * fabs(mean);
+        pause |= i < n && rest;
+        if (rest || (double)length >= correlation) {
+            sum += fabs(piece), squares += piece * piece;
+            piece = 0, length = 0;
+        }
+        if (!rest) piece += x[i], length++;
+    }
+    return !pause ? INFINITY : squares > 0 ? sum * sum / squares : 0;
+}
+
+static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
 {
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
         bt_reported *r = &s->series[k];
         *r = (bt_reported){.name = reported[k].name,
                            .key = reported[k].key,
-                           .present = reported[k].always || is_there(x, s->first, h->n)};
-        if (!r->present) r->mean = bt_stats_mean(NULL, 0);
+                           .mean = bt_stats_mean(NULL, 0),
+                           .peak = bt_history_largest(x, s->first, h->n),
+                           .start_peak = bt_history_largest(x, 0, s->first),
+                           .present =
+                               reported[k].always || (is_there(x, s->first, h->n) && !has_parted(t, k))};
         if (!r->present) continue;
         r->mean = bt_stats_mean(x + s->first, s->n);
         r->trend = bt_stats_trend(x + s->first, s->n);
         bt_stats_quarters(x + s->first, s->n, r->quarter);
-        r->peak = bt_history_largest(x, s->first, h->n);
-        r->start_peak = bt_history_largest(x, 0, s->first);
     }
+    bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
+    s->stretches = stretches(h->column[BT_COL_ICE] + s->first, s->n, ice->mean, 2 * ice->tau);
+    if (s->stretches < ice->n_eff && (s->stretches > 0 || t->concentration > 0)) ice->n_eff = s->stretches;
     for (int64_t i = s->first; i < h->n; i++) {
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
@@ -113,7 +148,7 @@ double bt_steady_peak_tension(const bt_steady *s, bool before)
     for (int k = 0; k < 2; k++) {
         const bt_reported *r = &s->series[branch[k]];
         const double x = before ? r->start_peak : r->peak;
-        if (r->present && !(x <= most)) most = x;
+        if (!isnan(x) && !(x <= most)) most = x;
     }
     return most;
 }
@@ -315,29 +350,38 @@ static void judge_trends(bt_steady *s)
     }
 }
 
-/// A body that no floe has touched tells nothing of the ice, however long the window.
-static void judge_contact(bt_steady *s, const bt_history *h, const bt_run_totals *t)
+/// A body that no floe has touched tells nothing of the ice, however long the window, and one that a few have touched
+/// little.
+static void judge_contact(bt_steady *s, const bt_run_totals *t)
 {
-    s->met_no_ice = t->concentration > 0;
-    for (int64_t i = s->first; i < h->n && s->met_no_ice; i++) s->met_no_ice = h->column[BT_COL_ICE][i] == 0;
+    s->met_no_ice = t->concentration > 0 && s->stretches == 0;
     if (s->met_no_ice)
         decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
                s->start, s->end, 100 * t->concentration);
+    else if (s->stretches > 0 && s->stretches < BT_STEADY_INDEPENDENT)
+        decide(s, BT_TOO_SHORT,
+               "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
+               "worth %.2g equal ones, fewer than %d: run longer",
+               s->start, s->end, s->stretches, BT_STEADY_INDEPENDENT);
 }
 
-/// The load that is known worst.
+/// The load that is known worst, of those that vary.
 static void judge_length(bt_steady *s, double dt)
 {
     const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
-        if (reported[k].load && r->present && !(worst && r->mean.n_eff >= worst->mean.n_eff)) worst = r;
+        const bool varies = !(r->mean.sd <= BT_STEADY_MATERIAL * fabs(r->mean.mean));
+        const double n = (double)s->n / (2 * r->mean.tau); // stretches of contact are judged before
+        if (!reported[k].load || !r->present || !varies || n >= BT_STEADY_INDEPENDENT) continue;
+        if (!worst || r->mean.tau > worst->mean.tau) worst = r;
     }
-    if (!worst || worst->mean.n_eff >= BT_STEADY_INDEPENDENT) return;
+    if (!worst) return;
     decide(s, BT_TOO_SHORT,
            "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
            "longer",
-           (double)s->n * dt, worst->mean.n_eff, worst->name, worst->mean.tau * dt, BT_STEADY_INDEPENDENT);
+           (double)s->n * dt, (double)s->n / (2 * worst->mean.tau), worst->name, worst->mean.tau * dt,
+           BT_STEADY_INDEPENDENT);
 }
 
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
@@ -356,7 +400,7 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
         s->start = time[s->first];
         s->end = time[h->n - 1];
     }
-    reduce(s, h);
+    reduce(s, h, t);
     if (s->n == 0) return;
     s->correlation_time = s->n > 1 ? s->series[BT_REPORTED_ICE].mean.tau * t->dt : NAN;
     if (!isfinite(s->series[BT_REPORTED_ICE].mean.mean) || !isfinite(s->series[BT_REPORTED_TOW].mean.mean))
@@ -373,6 +417,6 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     judge_course(s, h, c, t);
     judge_track(s, h, c, t);
     judge_trends(s);
-    judge_contact(s, h, t);
+    judge_contact(s, t);
     judge_length(s, t->dt);
 }

@@ -5,14 +5,14 @@
 //     0    earliest     start                                             end
 //
 // Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that
-// MSER-5 finds, halfway to the end of the run at the latest, and of these the
-// latest: the ice resistance may be steady long before the tension of the line is.
+// bt_stats_steady_start finds (MSER-5), halfway to the end of the run at the latest, and of these the latest: the ice resistance may be steady long before the tension of the line is.
 // Verdict:
 //     not steady   the window begins within the ramp, a reported series has a trend, the tow, its course or the body
 //                  changes within the window, the body comes to its own wake, leaves the ice (case/track.h) or stands
 //                  still, or the contacts were not solved: the mean is that of this stretch of time, and says nothing
 //                  of a longer tow
-//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load
+//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load. Of
+//                  the ice resistance no more count than the body had stretches of contact: see there
 //     steady       none of these was found
 #ifndef BT_STEADY_H
 #define BT_STEADY_H
@@ -47,7 +47,7 @@ typedef enum bt_reported_series {
 /// A series whose mean is reported, over the window.
 typedef struct bt_reported {
     const char *name, *key; ///< in a sentence; in summary.json
-    bool present;           ///< the run has it
+    bool present;           ///< the run has it over the whole window
     bt_mean mean;           ///< N
     bt_trend trend;         ///< N
     double quarter[4];      ///< means of the window's quarters, N
@@ -62,6 +62,7 @@ typedef struct bt_steady {
     double correlation_time;      ///< of the ice resistance, s
     double unconverged;           ///< share of the steps in the window that did not converge
     double residual;              ///< largest of them, m/s
+    double stretches;             ///< of contact with ice that the mean is worth; infinite without a pause
     bool met_no_ice;              ///< there is ice, and none has touched the body within the window
     bool given;                   ///< by output.window_start, not found
     int64_t first, n;             ///< steps

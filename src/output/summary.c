@@ -230,10 +230,12 @@ static void without_tow(bt_summary *s, const bt_case *c)
 }
 
 /// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
-/// on the course there. *in says when that turns within the window, for the body too. tow: velocity ordered over
+/// on the course there. The estimate says when that turns within the window, for the body too. tow: velocity ordered over
 /// ground, m/s.
-static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input *in, double tow[2])
+static void order_window(bt_summary *summary, const bt_history *h, const bt_case *c, double tow[2])
 {
+    const bt_steady *s = &summary->window;
+    bt_estimate_input *in = &summary->estimate;
     bt_case straight = *c; // texts and tables remain those of c
     bt_path path = {0};
     char why[200];
@@ -251,6 +253,9 @@ static void order_window(const bt_case *c, const bt_steady *s, bt_estimate_input
             bt_path_free(&path);
         }
     }
+    // As the body lay, which on a line or free need not be as it began; a mean across a turn would be of two courses.
+    const double yaw = mean_over(summary, h, BT_COL_YAW).mean;
+    if (isfinite(yaw) && !s->turns) straight.body.yaw = yaw;
     bt_estimate_conditions(&straight, in);
     in->turns = s->turns;
     tow[0] = straight.tow.speed * bt_cos(straight.tow.direction);
@@ -306,7 +311,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         double tow[2];
-        order_window(c, &s->window, &s->estimate, tow);
+        order_window(s, h, c, tow);
         measure_speeds(s, h, c, t, tow);
         s->estimate.concentration = t->concentration;
         if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;

@@ -100,8 +100,9 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     print_added(s, true);
     for (int k = 0; k < N_OF_THE_LINE; k++) {
         const bt_reported *r = &w->series[of_the_line[k].series];
-        if (!r->present) continue;
-        print_mean(of_the_line[k].label, &r->mean);
+        if (isnan(r->peak) && isnan(r->start_peak)) continue;
+        if (r->present) print_mean(of_the_line[k].label, &r->mean);
+        else printf("  %-19s none over the window: it has parted\n", of_the_line[k].label);
         printf("      peak            %s in the window", bt_force_text(a, r->peak));
         if (isfinite(r->start_peak)) printf(", %s in the start before it", bt_force_text(b, r->start_peak));
         printf("\n");

@@ -242,6 +242,12 @@ static void the_transient_is_cut(void **s)
         assert_in_range(start, TRANSIENT - 60, TRANSIENT + 300);
         assert_true(fabs(bt_stats_mean(x + start, N - start).mean) < 0.25);
     }
+    // One that matters to nobody is not.
+    for (int i = 0; i < N; i++) x[i] = 1000 + (i < TRANSIENT ? 20 : 0) + 0.1 * normal(&state);
+    assert_int_equal(bt_stats_steady_start(x, N, 0, 0.03), 0);
+    assert_in_range(bt_stats_steady_start(x, N, 0, 0.01), TRANSIENT, TRANSIENT + 300);
+    ar1(x, N, 0.5, &state);
+    for (int i = 0; i < TRANSIENT; i++) x[i] += -20.0 * (TRANSIENT - i) / TRANSIENT;
     // Told to begin later, it never goes back; and it never looks beyond the middle.
     assert_true(bt_stats_steady_start(x, N, 700, 0.02) >= 700);
     for (int i = 0; i < N; i++) x[i] = i;
@@ -249,6 +255,28 @@ static void the_transient_is_cut(void **s)
     // The middle of what follows: a long ramp must not leave nothing to search.
     assert_in_range(bt_stats_steady_start(x, N, 1200, 0.02), 1600 - 5, 1600);
     assert_in_range(bt_stats_steady_start(x, N, 1800, 0.02), 1900 - 5, 1900);
+}
+
+/// Rare large values of a wide distribution, as of a body that meets floes one by one, are no transient: a start just
+/// after the last large one would leave too low a mean.
+static void rare_large_values_are_not_cut(void **s)
+{
+    (void)s;
+    enum { N = 4000, SERIES = 400 };
+    static double x[N];
+    static const double events[] = {6, 25, 100};
+    uint64_t state = 31;
+    for (int k = 0; k < 3; k++) {
+        double whole = 0, kept = 0;
+        for (int i = 0; i < SERIES; i++) {
+            for (int j = 0; j < N; j++) x[j] = uniform(&state) < events[k] / N ? exp(normal(&state)) : 0;
+            const int64_t start = bt_stats_steady_start(x, N, 0, 0.02);
+            whole += bt_stats_mean(x, N).mean / SERIES;
+            kept += bt_stats_mean(x + start, N - start).mean / SERIES;
+        }
+        print_message("%g events: mean of the window %.3f of the whole\n", events[k], kept / whole);
+        assert_true(fabs(kept / whole - 1) < 0.03);
+    }
 }
 
 /// A series that settles to its end has its minimum at the last start, however far apart the starts lie.
@@ -303,6 +331,7 @@ int main(void)
         cmocka_unit_test(not_a_number_stays_visible),
         cmocka_unit_test(a_large_offset_does_not_drown_the_spread),
         cmocka_unit_test(the_transient_is_cut),
+        cmocka_unit_test(rare_large_values_are_not_cut),
         cmocka_unit_test(the_end_of_the_search_is_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

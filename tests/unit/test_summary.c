@@ -360,6 +360,85 @@ static void a_body_that_met_no_ice_tells_nothing(void **state)
     }
 }
 
+static int spikes_apart;
+static void spikes(bt_sample *s, int i) { set_forces(s, i % spikes_apart == 0 ? 1000 : 0, 121 + 10 * noise(i)); }
+
+/// Nearly every step of a body that meets floes one by one is an independent sample, of nothing.
+static void a_few_collisions_are_few_samples(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    const bt_run_totals t = totals(600);
+    for (int k = 0; k < 2; k++) {
+        spikes_apart = k ? 10 : 100;
+        char *json = summary_of(&c, 600, &t, FLOES, spikes);
+        assert_true((strstr(json, "is made of a few stretches of contact, worth 4 equal ones") == NULL) == (k > 0));
+        assert_string_equal(json_value(json, "verdict"), k ? "\"steady\"" : "\"too short\"");
+        assert_true(fabs(atof(json_value(json, "n_independent")) - (k ? 40 : 4)) <= 1);
+        free(json);
+    }
+}
+
+static void slow_ripple(bt_sample *s, int i) { set_forces(s, 1000 + 10 * sin(2 * BT_PI * i / 200.0), 1000); }
+
+/// A slow wave of one per cent of the mean leaves nothing to doubt.
+static void a_small_wave_needs_no_longer_run(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    const bt_run_totals t = totals(600);
+    char *json = summary_of(&c, 600, &t, FLOES, slow_ripple);
+    assert_string_equal(json_value(json, "verdict"), "\"steady\"");
+    free(json);
+}
+
+static void second_branch_parts(bt_sample *s, int i)
+{
+    sound_tow(s, i);
+    s->line_tension_2 = i < 100 ? 5000 : 0;
+}
+
+/// Its zeros are no tension, and its largest stays.
+static void a_branch_that_has_parted_has_no_mean(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    bt_event event[] = {{.time = 10, .kind = BT_EVENT_LINE_BROKEN, .subject = 2, .value = 5000}};
+    const bt_events events = {.event = event, .n = 1};
+    for (int parted = 0; parted < 2; parted++) {
+        bt_run_totals t = totals(600);
+        if (parted) t.events = &events;
+        char *json = summary_of(&c, 600, &t, FLOES, second_branch_parts);
+        assert_true((strstr(json, "\"line_tension_2\": {") == NULL) == (parted > 0));
+        assert_true(strstr(json, "\"line_tension_1\": {") != NULL);
+        assert_string_equal(json_value(json, "start_peak_line_tension_n"), "5000");
+        free(json);
+    }
+}
+
+static bool turned;
+static void line_turns_it(bt_sample *s, int i) { sound_tow(s, i), s->body_yaw = turned && i >= 100 ? 0.5 * BT_PI : 0; }
+
+/// A body that its line has turned pushes ice over the width that it has then.
+static void the_width_is_that_of_the_window(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
+    c.tow.speed = 0.5;
+    const bt_run_totals t = totals(600);
+    for (int k = 0; k < 2; k++) {
+        turned = k > 0;
+        char *json = summary_of(&c, 600, &t, FLOES, line_turns_it);
+        assert_true(fabs(atof(json_value(json, "width_m")) - (turned ? 4 : 2)) < 1e-9);
+        free(json);
+    }
+}
+
 /// The ice that overtakes the body in a moving window is what it met before.
 static void ice_that_overtakes_a_window_is_reported(void **state)
 {
@@ -384,9 +463,9 @@ static void the_peak_tension_is_of_the_strongest_branch(void **state)
     bt_steady_none(&s);
     assert_true(isnan(bt_steady_peak_tension(&s, false)));
     bt_reported *one = &s.series[BT_REPORTED_TENSION_1], *two = &s.series[BT_REPORTED_TENSION_2];
-    one->present = true, one->peak = 7, one->start_peak = 1;
+    one->peak = 7, one->start_peak = 1;
     assert_true(bt_steady_peak_tension(&s, false) == 7);
-    two->present = true, two->peak = 5, two->start_peak = 3;
+    two->peak = 5, two->start_peak = 3;
     assert_true(bt_steady_peak_tension(&s, false) == 7 && bt_steady_peak_tension(&s, true) == 3);
 }
 
@@ -401,6 +480,10 @@ int main(void)
         cmocka_unit_test(estimates_take_the_speed_of_the_window),
         cmocka_unit_test(a_body_that_met_no_ice_tells_nothing),
         cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
+        cmocka_unit_test(a_few_collisions_are_few_samples),
+        cmocka_unit_test(a_small_wave_needs_no_longer_run),
+        cmocka_unit_test(a_branch_that_has_parted_has_no_mean),
+        cmocka_unit_test(the_width_is_that_of_the_window),
         cmocka_unit_test(without_a_towed_body_forces_are_null),
     };
     int failed;
