@@ -329,7 +329,8 @@ static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *c);
 
-/// The window of the statistics begins there or later: output.window_start, or the end of the ramp, s.
+/// The window of the statistics begins there or later: output.window_start, or the end of the ramp, and where that is
+/// short for a body on its line, two periods of that later, s.
 double bt_case_earliest_window(const bt_case *c);
 
 /// Reference speed of the solver tolerance, m/s (> 0).

@@ -49,8 +49,9 @@ int64_t bt_stats_start_step(int64_t n);
 
 /// Start of the steady window of x[n]: that of MSER-5 (White 1997, Simulation 69), the truncation point that minimises
 /// the variance of the mean of batches of 5, searched over the first half of what follows `first` in steps of
-/// bt_stats_start_step(n - first); but only where what it cuts off is another state than the rest, in a rank test that
-/// single large values do not decide, and where their means differ by more than `material` of the rest's: else `first`.
+/// bt_stats_start_step(n - first); but only where ranks, which single large values do not decide, tell what it cuts off
+/// from the rest, and their means or standard deviations differ by more than `material` of the rest's mean: else
+/// `first`.
 /// Returns an index in [first, bt_stats_last_start(n, first)].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material);
 

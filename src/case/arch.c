@@ -110,8 +110,7 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
     if (a->gap > 0)
         bt_errors_add(warnings,
                       "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and is repeated so: "
-                      "the body comes into open water again and again, and neither a mean nor its verdict knows; leave "
-                      "both keys out",
+                      "the body comes into open water again and again; leave both keys out",
                       a->gap);
     if (a->unbounded)
         bt_errors_add(warnings,

@@ -134,12 +134,6 @@ int64_t bt_case_steps(const bt_case *c)
     return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
 }
 
-double bt_case_earliest_window(const bt_case *c)
-{
-    if (c->output.window_start >= 0) return c->output.window_start;
-    return c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp;
-}
-
 double bt_case_body_mass(const bt_case *c)
 {
     double v[2 * BT_MAX_VERTICES];

@@ -249,6 +249,14 @@ bool bt_case_start_is_slow(const bt_case *c)
     return bt_case_steepest_ramp(c) >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
 }
 
+double bt_case_earliest_window(const bt_case *c)
+{
+    if (c->output.window_start >= 0) return c->output.window_start;
+    if (c->tow.mode == BT_TOW_NONE) return 0;
+    // A start that jerks the line: the body swings on, and a few swings are too few to be told from chance.
+    return c->tow.ramp + (bt_case_start_is_slow(c) ? 0 : BT_RAMP_PERIODS * bt_case_line_period(c));
+}
+
 /// Speed and course that change within a step.
 static void warn_of_jerks(const bt_case *c, bt_errors *warnings)
 {

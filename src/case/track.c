@@ -77,23 +77,36 @@ static int64_t first_in_wake(const bt_track *t, const double period[2], double s
     return found;
 }
 
-/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was.
-static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size)
+/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was. Where
+/// ice that does not fill a period comes again with it, the last before the first gap: then *gap, which comes in as
+/// false.
+static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, bool *gap)
 {
     const bt_bound kind[2] = {c->domain.ends, c->domain.sides};
     const double first[2] = {c->domain.x0, c->domain.y0}, extent[2] = {c->domain.length, c->domain.width};
-    double low[2], high[2];
+    double low[2], high[2], period[2] = {0};
     bt_case_ice_region(c, low, high);
     for (int k = 0; k < 2; k++) {
         // up to a wall, which holds ice that drifts, and the body
-        const bool wall = kind[k] == BT_BOUND_WALL;
-        if (bt_bound_wraps(kind[k]) || (wall && low[k] < first[k] + size)) low[k] = -INFINITY;
-        if (bt_bound_wraps(kind[k]) || (wall && high[k] > first[k] + extent[k] - size)) high[k] = INFINITY;
+        const bool wall = kind[k] == BT_BOUND_WALL, wraps = bt_bound_wraps(kind[k]);
+        const bool filled = wraps && high[k] - low[k] > extent[k] - size;
+        if (filled || (wall && low[k] < first[k] + size)) low[k] = -INFINITY;
+        if (filled || (wall && high[k] > first[k] + extent[k] - size)) high[k] = INFINITY;
+        if (wraps && !filled) period[k] = extent[k], *gap = true;
     }
-    for (int64_t i = t->n - 1; i >= 0; i--)
-        if (t->x[i] >= low[0] && t->x[i] <= high[0] && t->y[i] >= low[1] && t->y[i] <= high[1])
-            return i + 1 < t->n ? i : t->n;
-    return t->n;
+    int64_t last = t->n;
+    for (int64_t i = 0; i < t->n; i++) {
+        const double at[2] = {t->x[i], t->y[i]};
+        bool in = true;
+        for (int k = 0; k < 2; k++) {
+            const double past = at[k] - low[k];
+            in = in && (period[k] > 0 ? past - period[k] * floor(past / period[k]) <= high[k] - low[k]
+                                      : past >= 0 && at[k] <= high[k]);
+        }
+        if (in) last = i;
+        else if (last < t->n && *gap) return last;
+    }
+    return last + 1 < t->n ? last : t->n;
 }
 
 void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
@@ -104,7 +117,8 @@ void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
     const double size = sqrt(4 / BT_PI * bt_shape_moments(corners, v).area);
     const double period[2] = {c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
                               c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0};
-    const int64_t wake = first_in_wake(t, period, size), last = last_in_ice(c, t, size);
+    bool gap = false;
+    const int64_t wake = first_in_wake(t, period, size), last = last_in_ice(c, t, size, &gap);
     if (wake < t->n)
         bt_errors_add(warnings,
                       "from %.4g s on the body meets ice that it has opened before, a period of the domain on: take a "
@@ -112,7 +126,8 @@ void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
                       t->time[wake]);
     if (last < t->n)
         bt_errors_add(warnings,
-                      "the body leaves the ice at %.4g s, and is in open water from then on: take a longer domain, set "
-                      "domain.ends: moving, or end the run before",
-                      t->time[last]);
+                      "the body leaves the ice at %.4g s, %s, or end the run before", t->time[last],
+                      gap ? "and comes into open water, for it does not fill the domain: leave ice.x_min, ice.x_max, "
+                            "ice.y_min and ice.y_max out"
+                          : "and is in open water from then on: take a longer domain, set domain.ends: moving");
 }

@@ -9,7 +9,8 @@
 //            and fro is the user's will, or the tide's. The period of a moving window does not count: what comes back
 //            there has been renewed.
 //     left   the body has gone out of the region for good. It can go out where the domain is open, or where the region
-//            ends before the domain does.
+//            ends before the domain does. A region that does not fill a period comes again with it, and open water
+//            between: there the first way out counts.
 #ifndef BERGTOW_TRACK_H
 #define BERGTOW_TRACK_H
 

@@ -268,6 +268,9 @@ LEFT = "the body leaves the ice at"
     ({"tow__speed": 0, "water": {"current_x": -0.5}}, 400), ({"water": {"current_x": 0.25}}, 800),
     ({"domain__ends": "wall", "domain__x0": -200, "domain__length": 1200, "ice__x_max": 200}, 400),
     ({"ice__concentration": 0}, None), ({"run__duration": 300}, None), ({"domain__ends": "periodic"}, None),
+    ({"domain__ends": "moving", "ice__x_max": 100}, 200), ({"domain__ends": "moving", "ice__x_max": 220}, None),
+    ({"domain__ends": "moving", "ice__x_min": 60, "ice__x_max": 150}, 300),
+    ({"domain__sides": "periodic", "domain__ends": "periodic", "ice__y_max": 80, "tow__direction": 90}, 160),
 ])
 def test_a_body_that_leaves_the_ice_is_no_steady_tow(tmp_path, changes, at):
     """Red as "too short ... run longer", with a mean of open water, and without a word in check."""
