@@ -232,6 +232,14 @@ static void check_sizes(const check *k)
     else if (!power && c->ice.size > room)
         bt_check_fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region",
                        c->ice.size, room);
+    const double period[2] = {bt_bound_wraps(c->domain.ends) ? c->domain.length : INFINITY,
+                              bt_bound_wraps(c->domain.sides) ? c->domain.width : INFINITY};
+    const double least = bt_min(period[0], period[1]);
+    if (c->ice.size_law != BT_SIZE_SINGLE && 2 * hi >= least && hi <= room) // else a run is refused by its seed
+        bt_check_fault(k, "ice.size_max",
+                       "two floes of %g m have no room side by side in the period of %g m as they turn; take smaller "
+                       "floes or a larger domain",
+                       hi, least);
     double n = bt_case_expected_floes(c);
     if (n > BT_MOST_FLOES)
         bt_check_fault(k, power ? "ice.size_min" : "ice.size",
@@ -241,15 +249,14 @@ static void check_sizes(const check *k)
 
 // The defaults of ice and body are those of a model basin. At full scale a number that the user did not give would look
 // like an answer.
-static void check_geographic(const check *k)
+/// by_hand: there are floes of the list without a thickness of their own.
+static void check_geographic(const check *k, bool by_hand)
 {
     const bt_case *c = k->c;
     if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
     const bool read = bt_case_reads_field(c),
                made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0),
                body = c->body.shape != BT_BODY_ABSENT;
-    bool by_hand = false; // floes of the list without a thickness of their own
-    for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || c->floes[i].thickness == c->ice.thickness;
     const struct {
         const char *key, *what;
         bool needed;
@@ -544,6 +551,8 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
 {
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
+    bool by_hand = false;
+    for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || isnan(c->floes[i].thickness);
     bt_case_tow_course(&k);
     follow(&k);
     bt_case_tow_follow(&k);
@@ -552,7 +561,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check_run(&k);
     check_domain(&k);
     check_region(&k);
-    check_geographic(&k);
+    check_geographic(&k, by_hand);
     check_sizes(&k);
     check_outlines(&k);
     bt_case_check_idle(&k);

@@ -8,6 +8,7 @@
 #include "base/elementary.h"
 #include "base/table.h"
 #include "case/body_shapes.h"
+#include "case/size_law.h"
 #include "bergtow/shape.h"
 
 double bt_case_tow_sign(const bt_case *c) { return bt_cos(c->tow.direction) < 0 ? -1 : 1; }
@@ -46,23 +47,19 @@ int bt_case_floe_outline(const bt_floe_def *f, double *v)
     return bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
 }
 
-double bt_case_power_moment(const bt_case *c, int k)
+double bt_case_size_moment(const bt_case *c, int k)
 {
-    const double e = k - c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
-    return fabs(e) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, e) - bt_pow(lo, e)) / e;
+    bt_sizes s;
+    bt_errors refused = {0};
+    const double moment = bt_sizes_init(&s, c, &refused) == BT_OK ? bt_sizes_moment(&s, k) : NAN;
+    bt_errors_free(&refused);
+    return moment;
 }
 
 double bt_case_mean_size(const bt_case *c)
 {
     if (c->ice.size_law != BT_SIZE_POWER || bt_case_reads_field(c)) return c->ice.size;
-    return bt_case_power_moment(c, 1) / bt_case_power_moment(c, 0);
-}
-
-static double mean_square_size(const bt_case *c)
-{
-    if (c->ice.size_law != BT_SIZE_POWER)
-        return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
-    return bt_case_power_moment(c, 2) / bt_case_power_moment(c, 0);
+    return bt_case_size_moment(c, 1);
 }
 
 bool bt_case_ice_is_random(const bt_case *c)
@@ -125,7 +122,7 @@ double bt_case_area_by_hand(const bt_case *c)
 double bt_case_expected_floes(const bt_case *c)
 {
     if (bt_case_reads_field(c) || c->ice.concentration == 0) return 0; // a power law has no limits then
-    return bt_max(0, bt_case_made_area(c) / (BT_PI / 4 * mean_square_size(c)));
+    return bt_max(0, bt_case_made_area(c) / (BT_PI / 4 * bt_case_size_moment(c, 2)));
 }
 
 int64_t bt_case_steps(const bt_case *c)

@@ -41,9 +41,8 @@ double bt_case_made_area(const bt_case *c);
 /// Area of the floes given by hand, m².
 double bt_case_area_by_hand(const bt_case *c);
 
-/// ∫ d^k d^(−a−1) over the sizes of a power law N(>d) ~ d^−a between ice.size_min and ice.size_max, m^(k−a): a mean of
-/// d^k is the one of k over that of 0.
-double bt_case_power_moment(const bt_case *c, int k);
+/// E[d^k] of the diameters that the size law draws, m^k; NaN where its keys leave none.
+double bt_case_size_moment(const bt_case *c, int k);
 
 /// Mean diameter of the floes, m: of the size law, and ice.size for ice that is read.
 double bt_case_mean_size(const bt_case *c);

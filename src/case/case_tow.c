@@ -192,6 +192,8 @@ void bt_case_tow_course(const bt_check *k)
 {
     bt_case *c = k->c;
     if (c->domain.frame == BT_FRAME_GEOGRAPHIC) bt_check_fill(&c->body.x, 0);
+    if (c->domain.ends == BT_BOUND_MOVING && c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction"))
+        bt_case_window_face(c, c->tow.waypoints[0]);
     if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction") && !isnan(c->body.x))
         c->tow.direction = bt_atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
 }

@@ -17,10 +17,22 @@ double bt_case_window_ahead(const bt_case *c)
     return ahead > 0 && ahead <= length ? ahead : length;
 }
 
+static double ahead_of(const bt_case *c)
+{
+    return isnan(c->domain.ahead) ? share_ahead * c->domain.length : c->domain.ahead;
+}
+
+void bt_case_window_face(bt_case *c, double x)
+{
+    if (!isnan(c->body.x)) return;
+    const double x0 = isnan(c->domain.x0) ? 0 : c->domain.x0, back = x0 + ahead_of(c),
+                 on = x0 + c->domain.length - ahead_of(c);
+    c->body.x = x < on ? back : on; // what lies between the two is ahead of the one, and a way back from the other
+}
+
 void bt_case_window_follow(bt_case *c)
 {
-    const double sign = bt_case_tow_sign(c), length = c->domain.length;
-    const double ahead = isnan(c->domain.ahead) ? share_ahead * length : c->domain.ahead;
+    const double sign = bt_case_tow_sign(c), length = c->domain.length, ahead = ahead_of(c);
     if (c->domain.frame == BT_FRAME_GEOGRAPHIC && isnan(c->body.x)) c->body.x = 0;
     if (isnan(c->domain.x0))
         c->domain.x0 = c->domain.frame == BT_FRAME_BASIN ? 0

@@ -52,10 +52,13 @@ static double factor(const bt_key *k, double ratio)
 
 static void refuse_range(const bt_case *c, const bt_key *k, double value, double ratio, bt_errors *err)
 {
-    char text[64];
-    bt_units_format(value, k->unit, text, sizeof text);
-    bt_errors_add(err, "%s: %s: becomes %s in the twin of scale %g, out of its range %s; take a scale nearer to 1",
-                  c->path ? c->path : "case", k->name, text, ratio, k->range);
+    char why[BT_WHY];
+    double one = 1; // of the unit of the range
+    bt_units_parse("1", k->unit, &one, why);
+    const char *unit = bt_units_bare(k->unit);
+    bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; take a scale nearer to 1",
+                  c->path ? c->path : "case", k->name, value / one, ratio, k->range, strcmp(unit, "-") ? " " : "",
+                  strcmp(unit, "-") ? unit : "");
 }
 
 static void scale_real(const bt_case *c, const bt_key *k, double *v, double ratio, bt_errors *err)

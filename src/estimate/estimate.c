@@ -195,16 +195,8 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     return e;
 }
 
-// Mean diameter weighted with area, <d³>/<d²>. Lognormal with mean m and relative spread s: <d^k> = m^k
-// (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: a gamma law (field/sizes.c), <d²> = m² (1 + s²), <d³> = m³ (1 + s²)
-// (1 + 2s²), so m (1 + 2s²). Truncation of these two is left out.
-static double weighted_size(const bt_case *c)
-{
-    const double s2 = c->ice.size_spread * c->ice.size_spread;
-    if (c->ice.size_law == BT_SIZE_LOGNORMAL) return c->ice.size * (1 + s2) * (1 + s2);
-    if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 2 * s2);
-    return bt_case_power_moment(c, 3) / bt_case_power_moment(c, 2);
-}
+/// Mean diameter weighted with area, <d³>/<d²>.
+static double weighted_size(const bt_case *c) { return bt_case_size_moment(c, 3) / bt_case_size_moment(c, 2); }
 
 void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
 {

@@ -66,11 +66,9 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
                                                     : NULL;
     if (fault) return fault;
     if (!many && bt_outline_convex(*n, v)) return NULL;
+    if (!many && smooth(n, v, counts)) return bt_shape_fault(*n, v);
     switch (nonconvex) {
-    case BT_NONCONVEX_REFUSE: {
-        if (!smooth(n, v, counts)) return "it is not convex; set ice.nonconvex to hull or split, or mend it";
-        return bt_shape_fault(*n, v);
-    }
+    case BT_NONCONVEX_REFUSE: return "it is not convex; set ice.nonconvex to hull or split, or mend it";
     case BT_NONCONVEX_HULL: {
         const double before = 0.5 * bt_outline_area2(*n, v);
         *n = bt_shape_hull(*n, v);

@@ -3,7 +3,7 @@
 #ifndef BT_FIELD_MAKE_H
 #define BT_FIELD_MAKE_H
 
-#include "bergtow/case.h"
+#include "case/size_law.h"
 #include "bergtow/field.h"
 #include "geometry/apart.h"
 #include "bergtow/shape.h"
@@ -35,17 +35,7 @@ double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const doub
 /// Bring a point into the region along its periodic directions.
 void bt_region_wrap(const bt_region *y, double *px, double *py);
 
-/// Size law with its derived constants; diameters are of the circle of equal area, m.
-typedef struct bt_sizes {
-    bt_size_law law;
-    double mean, spread, min, max, exponent;
-    double mu, sigma; ///< of ln d, law lognormal
-} bt_sizes;
-
-bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err);
 double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id); ///< diameter of floe id, m
-double bt_sizes_mean(const bt_sizes *s);      ///< E[d], m
-double bt_sizes_mean_area(const bt_sizes *s); ///< (π/4) E[d²], m²
 
 #define BT_TESSELLATION_VERTICES 12 ///< most vertices of a made floe
 

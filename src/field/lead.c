@@ -164,7 +164,7 @@ static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
     cut(&k, (int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
     double area = 0;
     for (bt_idx p = first; p < out->n; p++) area += out->area[p];
-    const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->round_x, s->l->period_y};
+    const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->period_x, s->l->period_y};
     for (bt_idx p = first; p < out->n; p++) {
         out->thickness[p] *= f->area[i] / area;
         for (size_t d = 0; d < 2; d++) { // a piece of a floe on a periodic edge may lie beyond it
@@ -331,10 +331,6 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
         bt_errors_add(err, "%s: tow.waypoints: %s", c->path ? c->path : "case", why);
         return BT_ERR_CASE;
     }
-    // What a moving window lets in behind the body is cut as far as the lead goes beyond its front, along x
-    // (case/case_environment.c); a shorter one ends there.
-    const bool round = c->domain.ends == BT_BOUND_PERIODIC ||
-                       (c->domain.ends == BT_BOUND_MOVING && c->lead.length > c->domain.ahead);
     const bt_lead l = {
         .name = c->path ? c->path : "case",
         .mode = c->lead.mode,
@@ -344,9 +340,10 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
         .path = path,
         .x0 = c->domain.x0,
         .y0 = c->domain.y0,
-        .period_x = round ? c->domain.length : 0,
+        // A moving window, too: a floe at its back reaches over the seam into a lead that ends at its front, and what
+        // it lets in is cut as far as the lead goes beyond that, along x (case/case_environment.c).
+        .period_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
-        .round_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
     };
     const double whole = bt_field_floe_area(f);
     const bool outside = whole - f->concentration * f->ice_area > 1e-9 * whole;

@@ -25,8 +25,7 @@ typedef struct bt_lead {
     int n;                    ///< points of the path, at least 2
     const double *path;       ///< [n][2] m
     double x0, y0;            ///< low corner of the domain, m
-    double period_x, period_y;///< m; 0 = the lead does not go round the domain
-    double round_x;           ///< the same for floes: a moving window, too, goes on from its end with its other end, m
+    double period_x, period_y;///< m; 0 = neither floes nor the lead go round the domain
 } bt_lead;
 
 /// What opening a lead did.

@@ -195,6 +195,7 @@ static const row rows[] = {
     {"history/body_in_ice_y", "m", "the same, y", "time"},
     {"history/body_vx", "m/s", "velocity of the body over ground, x, in each step", "time"},
     {"history/body_vy", "m/s", "the same, y", "time"},
+    {"history/body_yaw", "rad", "yaw of the towed body", "time"},
     {"history/sum_contacts", "1", "contact points, sum over the steps", "one"},
     {"history/sum_sweeps", "1", "sweeps, sum over the steps", "one"},
     {"history/sum_updates", "1", "updates of contacts, sum over the steps", "one"},

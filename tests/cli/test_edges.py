@@ -155,7 +155,7 @@ def test_estimates_are_those_of_the_leg_in_the_window(tmp_path):
     assert e["open_water_drag"]["force_n"] == pytest.approx(straight["open_water_drag"]["force_n"], rel=1e-6)
     on_a_line = run(tmp_path, changed(case, tow={"mode": "line", "line_length": 3, "line_stiffness": "5 kN"}),
                     name="line").summary["estimates"]
-    assert on_a_line["width_m"] == pytest.approx(1)  # it follows its course
+    assert on_a_line["width_m"] == pytest.approx(1, rel=2e-3)  # it follows its course, to within a degree
     across = run(tmp_path, changed(case, output__window_start=10), name="across").summary
     assert not any(v["compares"] for v in across["estimates"].values() if isinstance(v, dict) and "compares" in v)
     assert across["window"]["verdict"] == "not steady"

@@ -68,3 +68,35 @@ def test_the_interval_of_one_run_holds_the_mean_of_the_others(members):
     # Of 160 fields with 95 % each, 145 to 156 in 97 % of all cases; more than 98 % would be an interval wider than it
     # says.
     assert 0.9 <= min(shares) and max(shares) <= 0.98
+
+
+LIGHT = {
+    "run": {"dt": 0.5, "duration": "40 min"},
+    "domain": {"frame": "geographic", "length": "2 km", "width": "0.8 km", "ends": "moving", "sides": "periodic"},
+    "ice": {"concentration": 0.1, "size": 30, "thickness": 0.8},
+    "body": {"shape": "ship", "length": 80, "width": 20, "draft": 8},
+    "tow": {"mode": "speed", "speed": 0.8},
+    "output": {"frame_interval": -1}
+}
+
+
+def test_the_start_that_is_found_leaves_the_mean_of_light_ice(tmp_path):
+    """200 fields each of a ship in 2, 5, 10 and 20 % ice, from the start that is found and from the end of the ramp on.
+    Red at −20 to −5 % when the window begins where the variance of the mean is least."""
+    concentrations = [0.02, 0.05, 0.1, 0.2]
+    (tmp_path / "light.yml").write_text(json.dumps(LIGHT))
+    means = []
+    for name, words in (("found", []), ("whole", ["-s", "output.window_start=54"])):
+        study = {"title": name, "base": "light.yml", "repeats": 200, "seed": 1,
+                 "parameters": {"ice.concentration": concentrations}}
+        (tmp_path / f"{name}.yml").write_text(json.dumps(study))
+        subprocess.run([str(harness.BERGTOW), "ensemble", f"{name}.yml", "-o", name, "--jobs", "2", "--threads", "1",
+                        *words], cwd=tmp_path, check=True, stdout=subprocess.DEVNULL, timeout=3600)
+        found = [json.loads(p.read_text())["mean_ice_resistance_n"]
+                 for p in sorted((tmp_path / name).glob("members/*/summary.json"))]
+        means.append(np.array(found).reshape(len(concentrations), 200))
+    found, whole = means
+    for c, f, w in zip(concentrations, found, whole):
+        print(f"{c:.2f}: found {f.mean():.4g} N, whole {w.mean():.4g} N: {100 * (f.mean() / w.mean() - 1):+.1f} %, begins "
+              f"later in {100 * np.mean(f != w):.0f} % of the fields")
+    assert np.all(np.abs(found.mean(1) / whole.mean(1) - 1) < 0.04)

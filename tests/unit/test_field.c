@@ -351,6 +351,10 @@ static void test_size_laws(void **state)
     assert_law(&c, 30, 0);
     c.ice.size_spread = 0.3;
     assert_law(&c, 30, 9);
+    for (double spread = 0.45; spread <= 2; spread += 0.31) { // cut at a tenth of the mean, with the mean kept
+        c.ice.size_spread = spread;
+        assert_law(&c, 30, -1);
+    }
     c.ice.size_law = BT_SIZE_LOGNORMAL, c.ice.size_spread = 0.5;
     assert_law(&c, 30, 15);
     c.ice.size_min = 15, c.ice.size_max = 60; // cut, with the mean kept

@@ -217,7 +217,6 @@ static void a_lead_goes_over_the_seam(void **state)
                            .n = 2,
                            .path = path,
                            .period_x = 40,
-                           .round_x = 40,
                            .y0 = -10};
         bt_field f;
         make_field(&f, BT_BOUND_PERIODIC);
