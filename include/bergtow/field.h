@@ -34,6 +34,7 @@ typedef struct bt_outline_counts {
     double outside_area; ///< area of floes outside the ice region, which the concentration leaves out, m²
     /// Of a field file: area that its concentration refers to, that of the domain less the body, m²; else 0.
     double own_area, region_area;
+    double region[4]; ///< of a field file: its ice region, x_min, y_min, x_max, y_max, m; all 0 where it does not say
 } bt_outline_counts;
 
 typedef struct bt_field {

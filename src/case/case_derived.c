@@ -122,7 +122,8 @@ double bt_case_area_by_hand(const bt_case *c)
 double bt_case_expected_floes(const bt_case *c)
 {
     if (bt_case_reads_field(c) || c->ice.concentration == 0) return 0; // a power law has no limits then
-    return bt_max(0, bt_case_made_area(c) / (BT_PI / 4 * bt_case_size_moment(c, 2)));
+    const double mean_area = BT_PI / 4 * bt_case_size_moment(c, 2);
+    return mean_area > 0 ? bt_max(0, bt_case_made_area(c) / mean_area) : 0; // a law that is refused makes none
 }
 
 int64_t bt_case_steps(const bt_case *c)

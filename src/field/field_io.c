@@ -7,7 +7,7 @@
 //     /floes/thickness  [n]     m
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes, frame (the
-//                       domain.frame that x and y are of)
+//                       domain.frame that x and y are of), x_min, y_min, x_max, y_max m (the ice region)
 //     /case             the resolved case the field was made from
 // A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a
 // checksum (checksum.h): of such a file any damage is refused before HDF5, which crashes on some, reads a byte. A file
@@ -28,6 +28,8 @@
 #include "base/h5read.h"
 #include "base/h5axes.h"
 #include "case/ice_bounds.h"
+
+static const char *const region_names[4] = {"x_min", "y_min", "x_max", "y_max"};
 #include "base/largest.h"
 #include "base/checksum.h"
 
@@ -64,6 +66,9 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
         bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
         bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
+        const double own[4] = {c->ice.x_min, c->ice.y_min, c->ice.x_max, c->ice.y_max},
+                     *region = c->ice.field ? f->outlines.region : own;
+        for (int k = 0; k < 4; k++) bt_h5_attr_double(&h, "/floes", region_names[k], region[k]);
         bt_h5_attr_word(&h, "/floes", "frame", bt_field_frame(c));
         char *text = bt_case_resolved(c);
         bt_h5_write_text(&h, "/case", text ? text : "");
@@ -163,6 +168,17 @@ static void read_frame(const reader *r, char frame[16])
     H5Aclose(a);
 }
 
+/// The ice region, where the file says all of it: those of before do not.
+static void read_region(const reader *r, double region[4])
+{
+    double x[4];
+    for (int k = 0; k < 4; k++) {
+        if (r->r.status != BT_OK || H5Aexists_by_name(r->file, "/floes", region_names[k], H5P_DEFAULT) <= 0) return;
+        x[k] = read_number(r, region_names[k]);
+    }
+    if (x[0] < x[2] && x[1] < x[3]) memcpy(region, x, sizeof x);
+}
+
 static double read_ice_area(reader *r)
 {
     if (r->r.status != BT_OK) return NAN;
@@ -242,6 +258,7 @@ static void read_floes(reader *r, bt_field *f)
     }
     f->ice_area = read_ice_area(r);
     read_frame(r, f->frame);
+    read_region(r, r->counts.region);
     if (r->r.status == BT_OK) {
         f->n = f->cap = (bt_idx)n;
         f->cap_vertices = (int64_t)n_vertices;
@@ -263,8 +280,9 @@ static void read_floes(reader *r, bt_field *f)
     free(stored_area);
 }
 
-// Floes that are not convex by their hulls; the others to the bit as they were read.
-static void take_hulls(bt_field *f)
+/// Floes that are not convex as they are admitted, by their hulls or as they are; the others to the bit as they were
+/// read.
+static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
 {
     bt_field g;
     bt_field_init(&g);
@@ -272,11 +290,13 @@ static void take_hulls(bt_field *f)
     for (bt_idx i = 0; i < f->n; i++) {
         const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
-        double hull[2 * BT_MAX_VERTICES];
-        memcpy(hull, v, 2 * (size_t)n * sizeof *v);
-        const bool convex = bt_outline_convex(n, v);
-        bt_field_add(&g, convex ? n : bt_shape_hull(n, hull), hull, p[0], p[1], p[2], f->thickness[i]);
-        if (convex) { // centred once more, which changes last digits
+        int left = n;
+        double own[2 * BT_MAX_VERTICES];
+        bt_outline_counts counted = {0};
+        memcpy(own, v, 2 * (size_t)n * sizeof *v);
+        if (!bt_outline_convex(n, v)) bt_outline_admit(nonconvex, &left, own, &counted);
+        bt_field_add(&g, left, own, p[0], p[1], p[2], f->thickness[i]);
+        if (left == n) { // centred once more, which changes last digits
             memcpy(g.vertices + 2 * g.offsets[i], v, 2 * (size_t)n * sizeof *v);
             memcpy(g.pose + 3 * (size_t)i, p, 3 * sizeof *p);
             g.area[i] = f->area[i];
@@ -312,7 +332,7 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, b
     else bt_errors_move(err, &found);
     bt_errors_free(&found); // what was found in spite of errnum
     if (r.r.status == BT_OK) {
-        if (r.counts.hulled || r.counts.rounded) take_hulls(f);
+        if (r.counts.hulled || r.counts.rounded) take_admitted(f, nonconvex);
         f->outlines = r.counts;
     } else {
         bt_field_free(f);

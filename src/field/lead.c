@@ -349,12 +349,21 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
     const bool outside = whole - f->concentration * f->ice_area > 1e-9 * whole;
     bt_status status = bt_lead_cut(&l, f, s, err);
     free(path);
-    if (status == BT_OK && outside) {
-        bt_region y;
-        status = bt_region_init(&y, c, 0, err);
-        if (status == BT_OK) f->concentration = s->concentration_after = area_in_region(c, &y, f) / y.ice_area;
-        bt_region_free(&y);
+    if (status != BT_OK || !outside) return status;
+    bt_case of = *c; // with the region that the concentration refers to
+    if (c->ice.field) {
+        const double *r = f->outlines.region;
+        of.ice.x_min = r[0], of.ice.y_min = r[1], of.ice.x_max = r[2], of.ice.y_max = r[3];
+        if (!(r[0] < r[2])) { // a file that does not say: as if the lead took as large a share in it as beyond it
+            f->concentration = s->concentration_before * (bt_field_floe_area(f) / whole);
+            s->concentration_after = NAN;
+            return BT_OK;
+        }
     }
+    bt_region y;
+    status = bt_region_init(&y, &of, 0, err);
+    if (status == BT_OK) f->concentration = s->concentration_after = area_in_region(&of, &y, f) / y.ice_area;
+    bt_region_free(&y);
     return status;
 }
 
@@ -365,5 +374,7 @@ void bt_lead_stats_print(const bt_lead_stats *s)
            (long long)s->taken, s->area_taken);
     if (s->mode == BT_LEAD_CHANNEL) printf("removed");
     else printf("cut into %lld pieces of %.3g m", (long long)s->pieces, s->mean_piece);
-    printf("; concentration %.4g, was %.4g\n", s->concentration_after, s->concentration_before);
+    if (isnan(s->concentration_after)) printf("; concentration of the field's ice region, which its file does not name");
+    else printf("; concentration %.4g", s->concentration_after);
+    printf(", was %.4g\n", s->concentration_before);
 }

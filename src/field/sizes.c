@@ -60,7 +60,7 @@ void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors
     if (as_drawn(c) && n > 0 && bt_sizes_init(&s, c, &refused) == BT_OK) {
         const double mean = bt_sizes_mean(&s), second = bt_sizes_mean_area(&s) * 4 / BT_PI;
         const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = found->mean - mean;
-        if (fabs(off) > SIZE_OFF * mean && fabs(off) > 3 * scatter)
+        if (fabs(off) > SIZE_OFF * mean && fabs(off) > 2 * scatter)
             bt_errors_add(warnings,
                           "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
                           "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "

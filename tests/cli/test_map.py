@@ -9,6 +9,7 @@ import json
 import math
 import re
 
+import h5py
 import numpy as np
 import pytest
 
@@ -388,12 +389,20 @@ def test_rounded_corners(tmp_path):
 @pytest.mark.parametrize("depth, admitted", [(0.005, True), (0.02, True), (0.04, False), (1, False)])
 @pytest.mark.parametrize("geojson", [True, False])
 def test_how_deep_a_corner_is_rounding(tmp_path, depth, admitted, geojson):
-    """A thousandth of the extent, 28 m here; in an HDF5 file the same."""
+    """A thousandth of the extent, 28 m here; in an HDF5 file the same, which another program has made."""
     bay = [[0, 0], [10, depth], [20, 0], [20, 20], [0, 20]]
     write(tmp_path, bay)
-    case = changed(FRAMES["basin"], ice__outlines_crs="plane", ice__nonconvex="refuse" if geojson else "split")
+    case = changed(FRAMES["basin"], ice__outlines_crs="plane")
     if not geojson:
-        field(tmp_path, case)
+        with h5py.File(tmp_path / "out.h5", "w") as f:
+            x = np.array(bay)
+            y = np.roll(x, -1, axis=0)
+            cross = x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]
+            centre = ((x + y) * cross[:, None]).sum(0) / (3 * cross.sum())
+            for name, values in (("offsets", [0, 5]), ("vertices", x - centre), ("pose", [[*centre, 0]]),
+                                 ("thickness", [1.0])):
+                f[f"floes/{name}"] = np.array(values)
+            f["floes"].attrs["ice_area"] = 400.0 * 300
         case = changed(FRAMES["basin"], ice={"field": "out.h5"})
     path = write_case(tmp_path, case)
     said = call("check", path)

@@ -274,6 +274,14 @@ def test_field_files_with_bays(tmp_path):
     assert same_ring(ring[:-1], at(C_SHAPE, 5, 0), 1e-12)
 
 
+def test_outlines_that_are_convex_but_for_rounding_are_not_split(tmp_path):
+    """Red as a floe in convex parts, which never rafts; in a file of HDF5 beside one that is split the same."""
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at([[0, 0], [0.5, 2e-4], [1, 0], [1, 1], [0, 1]], 10, 0)))
+    for mode in ("split", "hull"):
+        o = run(tmp_path, changed(BASE, ice__nonconvex=mode), name=mode).summary["outlines"]
+        assert (o["rounded"], o["split"], o["hulled"]) == (1, mode == "split", mode == "hull")
+
+
 def test_the_resolved_case_reads_the_same_outlines(tmp_path):
     write(tmp_path, feature(at(C_SHAPE, 5, 0)))
     a = run(tmp_path, changed(BASE, ice__nonconvex="split"), name="deep/down/a")
