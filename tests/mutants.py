@@ -87,12 +87,28 @@ MUTANTS = {
          "piers ahead of the first lap"),
     ]),
     "src/field/lead.c": ([EDGES + "a_lead_leaves_the_concentration_of_the_region_as_it_is", "unit/test_lead"], [
-        ("if (status == BT_OK && outside) {", "if (false) {", "floes outside the region count after a lead"),
+        ("if (status != BT_OK || !outside) return status;", "return status;",
+         "floes outside the region count after a lead"),
+        ("of.ice.x_min = r[0], of.ice.y_min", "of.ice.y_min", "a field's region is the domain"),
     ]),
     "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused",
                            EDGES + "floes_below_the_least_size_are_counted"], [
         ("s.below += d < limit;", "s.below += d < 0.5 * limit;", "floes below the least size"),
+    ]),
+    "src/case/size_law.c": (["unit/test_field", EDGES + "what_leaves_no_sizes_is_refused"], [
         ("|| !(share > LEAST_SHARE)", "", "a law of which nothing is left"),
+        ("if (s->spread < CUT_MATTERS) return;", "return;", "small floes that are drawn again move the mean"),
+        ("return whole * gamma_above(shape + k, x)", "return whole * gamma_above(shape, x)", "moments of what is left"),
+    ]),
+    "src/case/track.c": (["cli/test_verdict.py::test_a_body_that_leaves_the_ice_is_no_steady_tow"], [
+        ("if (wraps && !filled) period[k] = extent[k], *gap = true;", "", "ice that does not fill a moving window"),
+    ]),
+    "src/base/stats.c": (["unit/test_stats"], [
+        ("is_transient(x + first, n - first, start - first, material) ? start : first;", "true ? start : first;",
+         "the largest collision is cut off"),
+        ("if (level && ranks_differ(z, count, first, cut > rest, look[i].accept)) return true;", "",
+         "a level that is not cut off"),
+        ("const double floor = 0.5 * material", "const double floor = 0 * material", "what does not matter is cut off"),
     ]),
     "src/run/study_values.c": ([EDGES + "a_range_of_angles_is_run_in_its_unit",
                                 "cli/test_check_study.py", "cli/test_budget.py"], [
@@ -519,7 +535,8 @@ MUTANTS = {
     "src/output/summary.c": (["unit/test_summary", EDGES + "estimates_are_those_of_the_leg_in_the_window",
                              EDGES + "the_ordered_speed_is_that_of_the_window",
                              MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"], [
-        ("if (isfinite(yaw) && !s->turns) straight", "if (false) straight", "the width at the start, not in the window"),
+        ("if (isfinite(yaw) && !s->turns) straight", "if (false) straight",
+         "the width at the start, not in the window"),
         ("in->ordered = speed - (along - ice[0]);", "in->ordered += ice[0] - water[0];", "the current of the run"),
         ("straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);", "",
          "width across the first leg"),

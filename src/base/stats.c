@@ -228,9 +228,9 @@ static bool is_transient(const double *x, int64_t n, int64_t start, double mater
 }
 
 // MSER(d) = Σ_{j>=d} ((Y_j − mean_d)² + f²) / (k − d)² over k batch means Y_j: the squared standard error that the
-// batches from d on would have if they were independent, with a noise f on top below which nothing need be cut: else the
-// minimum of a series without noise that settles is always at the end. Its size, half of `material` times the mean of
-// the second half, is the standard deviation of two levels as far apart as `material`. Backwards recursion (Welford)
+// batches from d on would have if they were independent, with a noise f on top below which nothing need be cut: else
+// the minimum of a series without noise that settles is always at the end. Its size, half of `material` times the mean
+// of the second half, is the standard deviation of two levels as far apart as `material`. Backwards recursion (Welford)
 // over d, so one pass. The minimum is searched in the first half of what follows `first` only: near the end few batches
 // agree by chance.
 //

@@ -122,7 +122,8 @@ bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
 /// Distance from the body to the end of the domain ahead of the tow, m; where no body is in the domain, its length.
 double bt_case_window_ahead(const bt_case *c);
 
-/// Where the body stands in the moving window of a basin, whose place is given, on its way to x, which may lie either way.
+/// Where the body stands in the moving window of a basin, whose place is given, on its way to x, which may lie either
+/// way.
 void bt_case_window_face(bt_case *c, double x);
 
 /// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case

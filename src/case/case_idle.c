@@ -67,7 +67,8 @@ static void list(const bt_case *c, idle out[RULES])
          "body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
          "body.drag.water_skin body.drag.air_form body.drag.air_skin",
          "body.shape", "without a towed body (body.shape: none)"},
-        {c->body.shape == BT_BODY_ABSENT, "tow.ramp tow.direction impact.panels output.panels", "body.shape", "without a body that is towed (body.shape: none)"},
+        {c->body.shape == BT_BODY_ABSENT, "tow.ramp tow.direction impact.panels output.panels", "body.shape",
+         "without a body that is towed (body.shape: none)"},
         {c->body.shape != BT_BODY_ABSENT && c->tow.mode == BT_TOW_NONE, "tow.ramp", "tow.mode",
          "on a body that is not towed (tow.mode: none)"},
         {!line, "tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type "

@@ -77,9 +77,9 @@ static int64_t first_in_wake(const bt_track *t, const double period[2], double s
     return found;
 }
 
-/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was. Where
-/// ice that does not fill a period comes again with it, the last before the first gap: then *gap, which comes in as
-/// false.
+/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was.
+/// Where ice that does not fill a period comes again with it, the last before the first gap: then *gap, which comes in
+/// as false.
 static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, bool *gap)
 {
     const bt_bound kind[2] = {c->domain.ends, c->domain.sides};

@@ -374,7 +374,8 @@ void bt_lead_stats_print(const bt_lead_stats *s)
            (long long)s->taken, s->area_taken);
     if (s->mode == BT_LEAD_CHANNEL) printf("removed");
     else printf("cut into %lld pieces of %.3g m", (long long)s->pieces, s->mean_piece);
-    if (isnan(s->concentration_after)) printf("; concentration of the field's ice region, which its file does not name");
+    if (isnan(s->concentration_after))
+        printf("; concentration of the field's ice region, which its file does not name");
     else printf("; concentration %.4g", s->concentration_after);
     printf(", was %.4g\n", s->concentration_before);
 }

@@ -96,8 +96,8 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
 
 /// How many equal stretches of contact the mean of x[n] is worth: with R_i the sum over a stretch between two steps of
 /// next to nothing, (Σ R_i)² / Σ R_i². A stretch longer than the correlation lasts is cut into pieces of that length.
-/// Infinite for a series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros: their number
-/// says nothing of a mean that is made of three collisions.
+/// Infinite for a series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros:
+/// their number says nothing of a mean that is made of three collisions.
 static double stretches(const double *x, int64_t n, double mean, double correlation)
 {
     double sum = 0, squares = 0, piece = 0;

@@ -5,7 +5,8 @@
 //     0    earliest     start                                             end
 //
 // Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that
-// bt_stats_steady_start finds (MSER-5), halfway to the end of the run at the latest, and of these the latest: the ice resistance may be steady long before the tension of the line is.
+// bt_stats_steady_start finds (MSER-5), halfway to the end of the run at the latest, and of these the latest: the ice
+// resistance may be steady long before the tension of the line is.
 // Verdict:
 //     not steady   the window begins within the ramp, a reported series has a trend, the tow, its course or the body
 //                  changes within the window, the body comes to its own wake, leaves the ice (case/track.h) or stands

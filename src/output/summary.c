@@ -230,8 +230,8 @@ static void without_tow(bt_summary *s, const bt_case *c)
 }
 
 /// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
-/// on the course there. The estimate says when that turns within the window, for the body too. tow: velocity ordered over
-/// ground, m/s.
+/// on the course there. The estimate says when that turns within the window, for the body too. tow: velocity ordered
+/// over ground, m/s.
 static void order_window(bt_summary *summary, const bt_history *h, const bt_case *c, double tow[2])
 {
     const bt_steady *s = &summary->window;

@@ -30,6 +30,7 @@ BALANCES = {
         domain__x0=0,
         tow__mode="line",
         tow__direction=10,
+        output__window_start=4,
         air={"wind_x": 2, "wind_y": 4},
         water={
             "latitude": 75, "current_x": 0.02, "tilt": "dynamic",

@@ -97,6 +97,6 @@ def test_the_start_that_is_found_leaves_the_mean_of_light_ice(tmp_path):
         means.append(np.array(found).reshape(len(concentrations), 200))
     found, whole = means
     for c, f, w in zip(concentrations, found, whole):
-        print(f"{c:.2f}: found {f.mean():.4g} N, whole {w.mean():.4g} N: {100 * (f.mean() / w.mean() - 1):+.1f} %, begins "
-              f"later in {100 * np.mean(f != w):.0f} % of the fields")
+        print(f"{c:.2f}: found {f.mean():.4g} N, whole {w.mean():.4g} N: {100 * (f.mean() / w.mean() - 1):+.1f} %, "
+              f"begins later in {100 * np.mean(f != w):.0f} % of the fields")
     assert np.all(np.abs(found.mean(1) / whole.mean(1) - 1) < 0.05)
