@@ -10,7 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, ROOT, TOW, call, changed, environment, launcher, run, script, warned, write_case
+from harness import (CASE, DONE, ROOT, TOW, call, changed, environment, launcher, placed, run, script, warned,
+                     write_case)
 
 FREE = {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}
 PAIR = {
@@ -262,6 +263,63 @@ def test_a_lead_leaves_the_concentration_of_the_region_as_it_is(tmp_path):
     assert lead["pieces"] > 5 and 0 < lead["concentration_before"] < 1
     assert lead["concentration_after"] == pytest.approx(lead["concentration_before"], rel=2e-3)
     assert call("resume", tmp_path / "out", "--quiet").returncode == DONE
+    # The same ice in a field file, which names its region. Red when that is the whole domain: less than half.
+    assert call("field", write_case(tmp_path, case | {"lead": {"mode": "none"}}), "-o", "map.h5",
+                cwd=tmp_path).returncode == DONE
+    stored = run(tmp_path, case | {"ice": {"field": "map.h5"}}, "--steps", 2, name="stored").summary["lead"]
+    assert stored["concentration_after"] == pytest.approx(lead["concentration_after"], rel=1e-9)
+
+
+def test_a_lead_up_to_the_front_of_a_window_takes_floes_on_the_seam(tmp_path):
+    """Red when those stay whose centres lie at the back: their other half is in the channel."""
+    case = {"run": {"dt": 1, "duration": 20},
+            "domain": {"frame": "geographic", "length": 1000, "width": 600, "ends": "moving", "sides": "periodic"},
+            "ice": {"concentration": 0.8, "size": 40, "thickness": 1}, "body": {"shape": "disc", "length": 60, "draft": 30},
+            "tow": {"mode": "speed", "speed": 0.5}, "lead": {"mode": "channel", "width": 80, "length": 600}}
+    r = run(tmp_path, case, "--steps", 1)
+    offsets, vertices, pose = (r.dataset(n) for n in ("/floes/offsets", "/floes/vertices", "/frames/pose"))
+    pose = pose[0]
+    for i in range(len(pose)):
+        xy = placed(vertices[offsets[i]:offsets[i + 1]], pose[i])
+        for shift in (0, 1000):
+            x, y = xy[:, 0] + shift, xy[:, 1]
+            assert not ((x > 40) & (x < 599) & (np.abs(y) < 39)).any(), (i, xy)
+
+
+def test_what_a_seed_or_a_frame_decided(tmp_path):
+    wide = {"run": {"dt": 1, "duration": 60},
+            "domain": {"frame": "geographic", "length": 400, "width": 300, "ends": "periodic", "sides": "periodic"},
+            "ice": {"concentration": 0.6, "size_law": "power", "size_min": 20, "size_max": 290, "thickness": 1},
+            "body": {"shape": "disc", "length": 60, "draft": 30}, "tow": {"mode": "speed", "speed": 0.5}}
+    done = call("check", write_case(tmp_path, wide))
+    assert done.returncode == CASE and "ice.size_max: two floes of 290 m have no room" in done.stderr
+    assert call("check", write_case(tmp_path, changed(wide, ice__size_max=140))).returncode == DONE
+    thin = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 200, "width": 200},
+            "ice": {"concentration": 0}, "body": {"shape": "none"},
+            "floes": [{"length": 3, "x": 3, "y": 0, "thickness": "4 cm"}]}
+    assert call("check", write_case(tmp_path, thin)).returncode == DONE
+    del thin["floes"][0]["thickness"]
+    assert "ice.thickness: missing" in call("check", write_case(tmp_path, thin)).stderr
+
+
+def test_a_window_of_the_basin_faces_its_way_points(tmp_path):
+    """Red with 20 m ahead of the body, and 30 behind, as if it were towed towards x."""
+    case = {"run": {"dt": 0.1, "duration": 20}, "domain": {"length": 50, "ends": "moving"}, "ice": {"concentration": 0.5},
+            "tow": {"mode": "line", "speed": 0.1, "waypoints": [[-60, 0]]}}
+    for at, x in ((-60, 30), (60, 20)):
+        r = run(tmp_path, changed(case, tow__waypoints=[[at, 0]]), "--steps", 1, name=str(x))
+        text = (r.dir / "case.resolved.yml").read_text()
+        assert f"  x: {x} m" in text and "  ahead: 30 m" in text
+
+
+def test_keys_of_the_tow_without_a_body(tmp_path):
+    case = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 400, "width": 300},
+            "ice": {"concentration": 0.3, "size": 30, "thickness": 1}, "body": {"shape": "none"},
+            "tow": {"mode": "none", "direction": 40}, "impact": {"panels": 12}, "output": {"panels": True}}
+    said = call("check", write_case(tmp_path, case))
+    assert said.returncode == CASE
+    for key in ("tow.direction", "impact.panels", "output.panels"):
+        assert f"{key}: has no effect without a body" in said.stderr
 
 
 def test_rounding_of_the_concentration_decides_nothing(tmp_path):

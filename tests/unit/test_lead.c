@@ -234,6 +234,32 @@ static void a_lead_goes_over_the_seam(void **state)
     }
 }
 
+/// Of a field file of before, which does not say where its ice region is, nobody knows the concentration after a lead.
+static void an_unnamed_region_leaves_the_concentration_unknown(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_case_defaults(&c);
+    c.domain.length = 40, c.domain.width = 20, c.domain.y0 = -10;
+    c.ice.field = (char[]){"old.h5"};
+    c.body.x = 10;
+    c.lead.mode = BT_LEAD_CHANNEL, c.lead.width = 4, c.lead.length = 20;
+    for (int named = 0; named < 2; named++) {
+        bt_field f;
+        make_field(&f, BT_BOUND_WALL);
+        f.ice_area = 400, f.concentration = 0.75; // of the half up to x = 20
+        if (named) memcpy(f.outlines.region, (double[]){0, -10, 20, 10}, sizeof f.outlines.region);
+        bt_lead_stats s;
+        bt_errors err = {0};
+        assert_int_equal(bt_lead_open(&c, &f, &s, &err), BT_OK);
+        assert_true(!isnan(s.concentration_after) == named);
+        assert_true(f.concentration > 0.5 && f.concentration < 0.74);
+        bt_field_free(&f);
+    }
+    c.ice.field = NULL;
+    bt_case_free(&c);
+}
+
 static void too_many_pieces_are_refused(void **state)
 {
     (void)state;
@@ -257,6 +283,7 @@ int main(void)
         cmocka_unit_test(channel_takes_what_it_overlaps),
         cmocka_unit_test(managed_pieces_are_small_and_keep_the_mass),
         cmocka_unit_test(a_lead_goes_over_the_seam),
+        cmocka_unit_test(an_unnamed_region_leaves_the_concentration_unknown),
         cmocka_unit_test(too_many_pieces_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
