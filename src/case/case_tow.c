@@ -255,10 +255,11 @@ double bt_case_earliest_window(const bt_case *c)
 {
     if (c->output.window_start >= 0) return c->output.window_start;
     if (c->tow.mode == BT_TOW_NONE) return 0;
+    if (bt_case_start_is_slow(c)) return c->tow.ramp;
     // A start that jerks the line: the body swings on, and a few swings are too few to be told from chance. Of a short
     // run half is left.
-    const double swings = bt_case_start_is_slow(c) ? 0 : BT_RAMP_PERIODS * bt_case_line_period(c);
-    return c->tow.ramp + bt_max(0, bt_min(swings, 0.5 * (c->run.duration - c->tow.ramp)));
+    const double swings = BT_RAMP_PERIODS * bt_case_line_period(c), rest = c->run.duration - c->tow.ramp;
+    return c->tow.ramp + bt_max(0, bt_min(swings, 0.5 * rest));
 }
 
 /// Speed and course that change within a step.
