@@ -68,6 +68,35 @@ static bool has_parted(const bt_run_totals *t, bt_reported_series k)
     return parted;
 }
 
+/// How many equal stretches of contact the mean of x[n] is worth: with R_i the sum over a stretch between two steps of
+/// next to nothing, (Σ R_i)² / Σ R_i². A stretch of more steps than `length` is cut into pieces of that. Infinite for a
+/// series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros:
+/// their number says nothing of a mean that is made of three collisions.
+static double stretches(const double *x, int64_t n, double mean, double length)
+{
+    double sum = 0, squares = 0, piece = 0;
+    int64_t steps = 0;
+    bool pause = false;
+    for (int64_t i = 0; i <= n; i++) {
+        const bool rest = i == n || fabs(x[i]) <= BT_STEADY_MATERIAL * fabs(mean);
+        pause |= i < n && rest;
+        if (rest || (double)steps >= length) {
+            sum += fabs(piece), squares += piece * piece;
+            piece = 0, steps = 0;
+        }
+        if (!rest) piece += x[i], steps++;
+    }
+    return !pause ? INFINITY : squares > 0 ? sum * sum / squares : 0;
+}
+
+/// The same of a window, with a long push as one stretch: up to a fortieth of the window, so that contact without end is
+/// worth twice as many as are asked for. The correlation alone, which short collisions make short, would take a push of
+/// some minutes for hundreds.
+static double contacts(const double *x, const bt_mean *m)
+{
+    return stretches(x, m->n, m->mean, bt_max(2 * m->tau, (double)m->n / (2 * BT_STEADY_INDEPENDENT)));
+}
+
 /// Index of the window's first step; h->n without a window.
 static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
 {
@@ -77,9 +106,14 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     int64_t first = earliest;
     const char *settles = NULL;
     if (s->given || earliest >= h->n) return first;
+    const double *ice = h->column[BT_COL_ICE];
+    const bt_mean all = bt_stats_mean(ice + earliest, h->n - earliest);
+    const bool few = contacts(ice + earliest, &all) < BT_STEADY_INDEPENDENT;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
-        if (!is_there(x, earliest, h->n)) continue;
+        // A few collisions tell nothing of a transient, nor does a tow force that is their sum with a constant.
+        const bool collisions = k == BT_REPORTED_ICE || (k == BT_REPORTED_TOW && c->tow.mode == BT_TOW_SPEED);
+        if ((few && collisions) || !is_there(x, earliest, h->n)) continue;
         const int64_t start = bt_stats_steady_start(x, h->n, earliest, BT_STEADY_MATERIAL);
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
@@ -88,31 +122,10 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     if (settles)
         decide(
             s, BT_NOT_STEADY,
-            "the %s still settles where the search for a start ends, halfway from the end of the ramp to that of the "
-            "run, and the window begins there (%g s): run longer",
-            settles, h->column[BT_COL_TIME][first]);
+            "the %s still settles where the search for a start ends, halfway from %g s to the end of the run, and the "
+            "window begins there (%g s): run longer",
+            settles, s->earliest, h->column[BT_COL_TIME][first]);
     return first;
-}
-
-/// How many equal stretches of contact the mean of x[n] is worth: with R_i the sum over a stretch between two steps of
-/// next to nothing, (Σ R_i)² / Σ R_i². A stretch longer than the correlation lasts is cut into pieces of that length.
-/// Infinite for a series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros:
-/// their number says nothing of a mean that is made of three collisions.
-static double stretches(const double *x, int64_t n, double mean, double correlation)
-{
-    double sum = 0, squares = 0, piece = 0;
-    int64_t length = 0;
-    bool pause = false;
-    for (int64_t i = 0; i <= n; i++) {
-        const bool rest = i == n || fabs(x[i]) <= BT_STEADY_MATERIAL * fabs(mean);
-        pause |= i < n && rest;
-        if (rest || (double)length >= correlation) {
-            sum += fabs(piece), squares += piece * piece;
-            piece = 0, length = 0;
-        }
-        if (!rest) piece += x[i], length++;
-    }
-    return !pause ? INFINITY : squares > 0 ? sum * sum / squares : 0;
 }
 
 static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
@@ -133,8 +146,13 @@ static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
         bt_stats_quarters(x + s->first, s->n, r->quarter);
     }
     bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
-    s->stretches = stretches(h->column[BT_COL_ICE] + s->first, s->n, ice->mean, 2 * ice->tau);
-    if (s->stretches < ice->n_eff && (s->stretches > 0 || t->concentration > 0)) ice->n_eff = s->stretches;
+    const double *x = h->column[BT_COL_ICE] + s->first;
+    s->stretches = contacts(x, ice);
+    const double most = s->stretches < BT_STEADY_INDEPENDENT ? s->stretches
+                                                             : stretches(x, s->n, ice->mean, 2 * ice->tau);
+    if (most < ice->n_eff && (most > 0 || t->concentration > 0)) ice->n_eff = most;
+    // A body that met no ice has a mean of 0, and nothing says how far from it that of a longer tow is.
+    if (s->stretches == 0 && t->concentration > 0) ice->se = ice->low = ice->high = NAN;
     for (int64_t i = s->first; i < h->n; i++) {
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
@@ -339,6 +357,8 @@ static void judge_trends(bt_steady *s)
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
         const bt_trend *t = &r->trend;
+        // that a few collisions came early or late is no trend
+        if (s->stretches < BT_STEADY_INDEPENDENT && (k == BT_REPORTED_ICE || k == BT_REPORTED_TOW)) continue;
         if (!r->present || !t->significant || !(fabs(t->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
         decide(s, BT_NOT_STEADY,
                "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the "
@@ -355,7 +375,12 @@ static void judge_trends(bt_steady *s)
 static void judge_contact(bt_steady *s, const bt_run_totals *t)
 {
     s->met_no_ice = t->concentration > 0 && s->stretches == 0;
-    if (s->met_no_ice)
+    if (s->met_no_ice && t->lead.mode == BT_LEAD_CHANNEL)
+        decide(s, BT_TOO_SHORT,
+               "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it that "
+               "the ice does not come into the channel",
+               s->start, s->end, t->lead.width);
+    else if (s->met_no_ice)
         decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
                s->start, s->end, 100 * t->concentration);
     else if (s->stretches > 0 && s->stretches < BT_STEADY_INDEPENDENT)

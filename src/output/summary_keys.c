@@ -107,7 +107,8 @@ static void write_reported(bt_json *j, const char *key, const view *v, const voi
     bt_json_open(j, key, '{');
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &v->s->window.series[k];
-        if (!r->present || v->s->window.n == 0) continue;
+        // Of a branch that has parted its peaks, without a mean.
+        if (v->s->window.n == 0 || (!r->present && isnan(r->peak) && isnan(r->start_peak))) continue;
         bt_json_open(j, r->key, '{');
         bt_json_keys_write(j, bt_reported_keys, bt_n_reported_keys, v, (const void *const[]){r});
         bt_json_close(j, '}');

@@ -75,6 +75,10 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     char a[32], b[32], d[32];
     if (w->n == 0) {
         printf("  window              none: %s\n", w->reason);
+        for (int k = 0; k < BT_N_REPORTED; k++)
+            if (isfinite(w->series[k].start_peak))
+                printf("    largest before it %s of the %s\n", bt_force_text(a, w->series[k].start_peak),
+                       w->series[k].name);
         return;
     }
     printf("  window              %g to %g s (%s), %s; %.3g independent samples", w->start, w->end,
@@ -85,14 +89,19 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     printf("  %s\n",
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     if (c->tow.mode == BT_TOW_NONE) printf("    ice resistance    none: nothing tows the body\n");
+    else if (w->met_no_ice) printf("    ice resistance    none: the body met no ice\n");
     else print_mean("  ice resistance", &s->ice);
-    printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
-           bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
+    if (bt_case_reads_field(c) || bt_case_ice_is_random(c))
+        printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
+               bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s,", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95),
            bt_force_text(b, s->p99), bt_force_text(d, s->peak));
+    if (w->series[BT_REPORTED_ICE].start_peak > s->peak)
+        printf("      start           the largest, %s, lies before the window\n",
+               bt_force_text(a, w->series[BT_REPORTED_ICE].start_peak));
     printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, s->balance),
            bt_balance_words(), bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
