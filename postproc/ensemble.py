@@ -20,7 +20,7 @@ import stat_fit
 import stat_mean
 import stat_sensitivity
 from bergtow_read import RunError
-from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
+from ensemble_read import DOUBTS, EXCLUDABLE, FAILED, FINISHED, WAITING, Ensemble
 from text_table import scale, short
 
 import numpy as np
@@ -33,12 +33,12 @@ MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted
 def member(e, m):
     """Mean of one member with its standard error within the run."""
     within = stat_mean.series_mean(e.steady(m))
-    mean = e.mean[m]
+    mean, independent = e.mean[m], e.number("window_n_independent", m)
     low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
     return {
         "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
         "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
-        "independent": within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
+        "independent": independent if np.isfinite(independent) else within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
     }
 
 
@@ -349,7 +349,7 @@ def main(argv=None):
                    help="relative error of the mean that the number of fields needed is for (default 0.05)")
     p.add_argument("--exclude",
                    action="append",
-                   choices=sorted(DOUBTS),
+                   choices=EXCLUDABLE,
                    default=[],
                    help="leave out members with this doubt, and name them; may be repeated")
     p.add_argument("--hours",

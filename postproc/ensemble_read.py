@@ -39,9 +39,13 @@ DOUBTS = {
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
                 "solved",
     "short": "no window, or fewer than 20 independent samples in it",
+    "few": "the body met no ice in its window, or made fewer than 20 stretches of contact",
     "stopped": "the run stopped early",
     "other": "a warning of another kind",
 }
+
+#: doubts by which members may be left out: not that they met little ice, which would leave out the small means
+EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
 
 
 @dataclass(frozen=True)
@@ -291,9 +295,12 @@ class Ensemble:
             verdict, independent = window.get("verdict"), self.number("window_n_independent", m)
             short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(
                 window.get("warning"))
+            reason = window.get("reason") or ""
+            few = verdict == "too short" and ("stretches of contact" in reason or "met no ice" in reason)
+            short = short and not few
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
-                "unsteady": verdict == "not steady", "short": short, "stopped": bool(texts.get("stopped"))
+                "unsteady": verdict == "not steady", "short": short, "few": few, "stopped": bool(texts.get("stopped"))
             }
             found |= {kind for kind, there in checks.items() if there}
             warnings = len(texts.get("warnings") or [])

@@ -38,7 +38,10 @@ def value(d, factor):
 
 
 def ends(d, factor):
-    return "–" if "refused" in d else pair(d["interval_95"], factor)
+    if "refused" in d:
+        return "–"
+    low, high = d["interval_95"]
+    return pair((low, text_table.bound(d["value"], high)), factor)
 
 
 def design(s, markdown):

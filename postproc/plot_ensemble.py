@@ -13,6 +13,7 @@
 """
 import argparse
 import sys
+import textwrap
 from pathlib import Path
 
 import command
@@ -23,7 +24,7 @@ import stat_mean
 import style
 from bergtow_read import RunError
 from ensemble import add_load_options, extremes, member, nothing_to_count, sample, sensitivity
-from ensemble_read import DOUBTS, Ensemble, reading, short_key, worded
+from ensemble_read import EXCLUDABLE, Ensemble, reading, short_key, worded
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -294,20 +295,21 @@ def draw_sweep(e, key):
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
             stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
-    height = figure.get_size_inches()[1]
-    lines = -(-len(pairs) // 3)
+    wide, height = figure.get_size_inches()
+    note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
+    lines, below = -(-len(pairs) // 3), 0.15 * max(0, len(note) - 1)
     figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0],
                            right=0.98,
                            top=1 - 0.95 / height,
-                           bottom=(0.95 + 0.24 * lines) / height,
+                           bottom=(0.95 + below + 0.24 * lines) / height,
                            wspace=0.08,
                            hspace=0.28)
     figure.legend([h for h, _ in pairs], [t for _, t in pairs],
                   loc="lower left",
-                  bbox_to_anchor=(0.02, 0.22 / height),
+                  bbox_to_anchor=(0.02, (0.22 + below) / height),
                   ncol=3,
                   fontsize=9)
-    figure.text(0.025, 0.08 / height, note, fontsize=9, color=style.FAINT)
+    figure.text(0.025, 0.08 / height, "\n".join(note), fontsize=9, color=style.FAINT)
     headline(figure, e, f"resistance against {short_key(key)}")
     return figure
 
@@ -680,7 +682,7 @@ def main(argv=None):
                    help="kind of the files (default png)")
     p.add_argument("--exclude",
                    action="append",
-                   choices=sorted(DOUBTS),
+                   choices=EXCLUDABLE,
                    default=[],
                    help="leave out members with this doubt; may be repeated")
     add_load_options(p)

@@ -90,6 +90,7 @@ def worth(value, low, high, least=-np.inf):
     """(value, interval) of a force in words: to three digits, up where the nearest lies below `least` and the value
     does not; to the two digits that the wider side of the interval leaves; "no bound" where it has no end."""
     factor, unit = style.scale([value], "N")
+    high = text_table.bound(value, high)
     place = text_table.last_place(value / factor, low / factor, high / factor)
     said = style.quantity(text_table.designed(value, least), "N")
     if place is None:
@@ -170,9 +171,11 @@ def governing(s):
         x = text_table.designed(x, least)
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
-    said = without_value(s, d["value"])
+    said, high = without_value(s, d["value"]), text_table.bound(d["value"], d["interval_95"][1])
     said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
-             f"{both(d['value'], d['largest'])}; upper end of its interval {both(d['interval_95'][1])}")
+             f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
+    if np.isinf(high):
+        said += ": these fields do not know how far the tail reaches, and it is no value to build on"
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
 

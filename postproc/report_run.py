@@ -108,6 +108,12 @@ def start_peak(run, key="start_peak_line_tension_n"):
     return f"; in the start before it {force(before)}" if np.isfinite(before) else ""
 
 
+def ice_start_peak(run):
+    """The same of the ice resistance, where that is larger than any in the window."""
+    key = "window.series.ice_resistance.start_peak_n"
+    return start_peak(run, key) if run.number(key) > run.number("peak_ice_resistance_n") else ""
+
+
 def figures(run):
     """The few numbers at the head of the page: (label, number, what stands below it)."""
     if run.towed is None:
@@ -120,12 +126,12 @@ def figures(run):
     out = [(f"ice resistance, {name}", ice,
             (f"95 % interval {ice_range}; " if ice_range != "–" else "no interval; ") + window),
            (f"tow force, {name}", tow, f"95 % interval {tow_range}"),
-           ("largest ice resistance in a step", force(n("peak_ice_resistance_n")), run.summary.get("peak_conversion")
-            or "")]
-    if np.isfinite(n("peak_line_tension_n")):
+           ("largest ice resistance in a step", force(n("peak_ice_resistance_n")),
+            (run.summary.get("peak_conversion") or "") + ice_start_peak(run))]
+    if np.isfinite([n("peak_line_tension_n"), n("start_peak_line_tension_n")]).any():
         out.append(("largest line tension", force(n("peak_line_tension_n")),
                     "mean over a step, within the window" + start_peak(run)))
-    if np.isfinite(n("impacts.largest.peak_n")):
+    if np.isfinite([n("impacts.largest.peak_n"), n("impacts.start_largest_peak_n")]).any():
         out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")),
                     f"{run.summary['impacts']['conversion']}, within the window" +
                     start_peak(run, "impacts.start_largest_peak_n")))
@@ -147,6 +153,11 @@ def forces(run):
         key = run.attribute(name, "summary") or f"mean_{name}_n"
         mean = n(key)
         if not np.isfinite(mean) and name not in ("ice_resistance", "tow_force"):
+            peaks = [n(f"window.series.{name}.{when}peak_n") for when in ("", "start_")]
+            if np.isfinite(peaks).any():
+                rows.append((f"{run.label(name)}, largest step mean", force(peaks[0]), "",
+                             "no mean over the window: it has parted" +
+                             start_peak(run, f"window.series.{name}.start_peak_n")))
             continue
         known = re.fullmatch(r"mean_(.*)_n", key)
         value, interval = with_interval(*run.interval(known[1])) if known else (force(mean), "–")
@@ -159,8 +170,8 @@ def forces(run):
     rows += [("standard deviation of the ice resistance", force(n("sd_ice_resistance_n")), "", conversion),
              ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
              ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion),
-             ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion)]
-    if np.isfinite(n("peak_line_tension_n")):
+             ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion + ice_start_peak(run))]
+    if np.isfinite([n("peak_line_tension_n"), n("start_peak_line_tension_n")]).any():
         rows.append(("largest line tension", force(n("peak_line_tension_n")), "",
                      "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("reference.mean_force_n")):
@@ -209,6 +220,8 @@ def impacts(run):
             f"{style.short(big['impulse_ns'])} N s, "
             f"approach {style.short(big['approach_m_s'])} m/s), {struck} at {style.short(big['time_s'])} s" +
             start_peak(run, "impacts.start_largest_peak_n")))
+    elif np.isfinite(run.number("impacts.start_largest_peak_n")):
+        rows.append(("largest peak", "none in the window" + start_peak(run, "impacts.start_largest_peak_n")))
     return {
         "conversion": i["conversion"], "rows": rows,
         "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"]))

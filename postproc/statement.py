@@ -30,7 +30,9 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
     "unsteady": "members whose window is not steady",
-    "short": "members with fewer than 20 independent samples", "stopped": "members that stopped early"
+    "short": "members with fewer than 20 independent samples",
+    "few": "members whose mean is made of fewer than 20 stretches of contact, or of none",
+    "stopped": "members that stopped early"
 }
 #: what stands in the line of what the values hold for: case key, words in front and behind
 HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
@@ -279,9 +281,10 @@ def _of_the_line(e, rows, case, lines):
         each = [f"branch {k} in {sum(v['subject'] == k for v in broken)}"
                 for k in sorted({v["subject"] for v in broken} - {0})]
         first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
-        out.append(("tow force and tension are cut off where the line parts, and have no design value; means and "
-                    "largest values are of each tow until nothing tows it, of a tension until its branch parts, and "
-                    "are less than those of a line that holds; for a design value simulate without breaking_load",
+        out.append(("tow force and tension have no design value where a line parts: they are cut off there, or, where "
+                    "one branch of two holds, go on as those of another tow, whose body lies otherwise and can load "
+                    "that branch more; means and largest values are of each tow until nothing tows it, of a tension "
+                    "until its branch parts, and mix the two; for a design value simulate without breaking_load",
                     ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))

@@ -90,12 +90,15 @@ def to_place(value, place):
     return f"{round(value, -place) + 0.0:.{max(0, -place)}f}" if np.isfinite(value) else "no bound"
 
 
+def bound(value, high):
+    """The upper end of the interval of a level: one FAR times the level away bounds nothing, but says that the sample
+    does not know the tail, and is infinite."""
+    return np.inf if np.isfinite([value, high]).all() and value > 0 and high > FAR * value else high
+
+
 def level(value, ends, factor=1.0):
-    """A level, to three digits, and its interval, to those that it is worth. An upper end FAR times the level away
-    bounds nothing: it says that the sample does not know the tail."""
-    low, high = ends
-    if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
-        high = np.inf
+    """A level, to three digits, and its interval, to those that it is worth."""
+    low, high = ends[0], bound(value, ends[1])
     place = last_place(value / factor, low / factor, high / factor)
     if place is None or np.isnan([low, high]).any():
         return number(value / factor), pair((low, high), factor)

@@ -627,6 +627,7 @@ MUTANTS = {
         ("start == bt_stats_last_start(h->n, earliest)", "start > h->n", "a start that never settles"),
         (".start_peak = bt_history_largest(x, 0, s->first)", ".start_peak = bt_history_largest(x, 0, h->n)", "start"),
         ("&& !has_parted(t, k))", ")", "a mean of zeros of a branch that has parted"),
+        ("if ((few && collisions) || !is_there", "if (!is_there", "a window that begins after a collision"),
         ("return !pause ? INFINITY : squares", "return pause ? INFINITY : squares", "three collisions are steady"),
         ("const bool varies = !(r->mean.sd <=", "const bool varies = !(r->mean.sd <= 0 *",
          "a ripple that nobody feels is too short"),

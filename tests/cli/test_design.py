@@ -133,12 +133,13 @@ def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
 
 @pytest.mark.parametrize("value, low, high, words", [
     (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")),
-    (123456.0, 20000.0, 1.5e6, ("123 kN", "20 to 1500 kN")),
+    (123456.0, 20000.0, 1.2e6, ("123 kN", "20 to 1200 kN")),
+    (123456.0, 20000.0, 1.5e6, ("123 kN", "20 to no bound kN")),  # ten times the value away
     (947e3, 924e3, 2200e3, ("947 kN", "920 to 2200 kN")),
     (5.2e6, 4.13e6, np.inf, ("5.20 MN", "4.1 to no bound MN")),
     (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
     (12.0, np.nan, np.nan, ("12.0 N", "–")), (0.0, 0.0, 0.0, ("0 N", "–")),
-    (17.0, 0.0, 3e6, ("17.0 N", "0 to 3000000 N")), (1049e3, 900e3, 3200e3, ("1050 kN", "900 to 3200 kN")),
+    (17.0, 0.0, 3e6, ("17.0 N", "0 to no bound N")), (1049e3, 900e3, 3200e3, ("1050 kN", "900 to 3200 kN")),
     (1051e3, 1050.5e3, 9000e3, ("1050 kN", "1050 to 9000 kN"))
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):

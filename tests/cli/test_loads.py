@@ -699,9 +699,9 @@ def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
     s, text = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)], 7: [(1800, 1)]},
                              events=events))
     c, first = s["conditions"][0], warnings_of(s)[0]
-    assert first.startswith("tow force and tension are cut off where the line parts, and have no design value")
+    assert first.startswith("tow force and tension have no design value where a line parts: they are cut off there")
     assert "the line parted in 4 of 10 tows, " in first and "the first at 200 s; in 4 of them nothing towed" in first
-    assert "WARNING: Tow force and tension are cut off" in text
+    assert "WARNING: Tow force and tension have no design value where a line parts" in text
     assert "WARNING: No value (the line parted in 4 of 10 tows)." in text
     for name in ("tow_force", "line_tension_1", "ice_resistance"):
         x = c["loads"][name]

@@ -707,3 +707,24 @@ def test_numbers_survive_packing():
     numbers, low, step = replay_data.quantise(x, 0.0, 10.0, 10.0)
     assert np.abs((low + step * numbers - x + 5) % 10 - 5).max() <= step / 2 and low + step * 65536 == 10.0
     assert list(replay_data.thinned(10, 4)) == [0, 3, 6, 9] and list(replay_data.thinned(3, 8)) == [0, 1, 2]
+
+
+def test_the_largest_load_may_lie_before_the_window():
+    """Red with "0 N" for the largest load of a tow that met 1 MN before its window, and no row of its collisions."""
+    numbers = {"peak_ice_resistance_n": 0.0, "window.series.ice_resistance.start_peak_n": 1.04e6,
+               "start_peak_line_tension_n": 1.3e6, "impacts.start_largest_peak_n": 2.65e6, "impacts.hours": 0.4,
+               "window.series.line_tension_2.peak_n": 3.45e5}
+    impacts = {"conversion": "half-sine", "collisions": 0, "collisions_whole_run": 2, "largest": None, "exceedance": []}
+    run = SimpleNamespace(
+        towed=0, window=(921.0, 2400.0), window_name="window", mean_name="over the window",
+        number=lambda key: numbers.get(key, np.nan), interval=lambda key: (0.0, np.nan, np.nan),
+        summary={"impacts": impacts, "peak_conversion": "impulse / dt", "window": None},
+        by_role=lambda *roles: ["line_tension_2"], attribute=lambda name, key: None,
+        label=lambda name: "tension of the second branch", description=lambda name: "")
+    words = {label: f"{value} {below}" for label, value, below in report_run.figures(run)}
+    assert "in the start before it 1040 kN" in words["largest ice resistance in a step"]
+    assert "in the start before it 1300 kN" in words["largest line tension"]
+    assert "in the start before it 2.65 MN" in words["largest peak of a collision"]
+    assert ("largest peak", "none in the window; in the start before it 2.65 MN") in report_run.impacts(run)["rows"]
+    parted, = [row for row in report_run.forces(run) if "second branch" in row[0]]
+    assert parted[1] == "345 kN" and "it has parted" in parted[3]

@@ -280,6 +280,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
         with pytest.raises(RunError, match=words):
             ensemble.main([str(a) for a in arguments])
     for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"),
+                             (("--exclude", "few"), "invalid choice"),  # the small means would go
                              (("--blocks", "0"), "below 1")):
         with pytest.raises(SystemExit) as stop:
             ensemble.main([str(plain[0]), *arguments])

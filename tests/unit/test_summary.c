@@ -380,6 +380,25 @@ static void a_few_collisions_are_few_samples(void **state)
     }
 }
 
+static void early_collision(bt_sample *s, int i)
+{
+    spikes_apart = 100;
+    spikes(s, i);
+    if (i >= 40 && i < 160) set_forces(s, i == 50 ? 1e6 : 5000, 121 + 10 * noise(i)); // and a push after it
+}
+
+/// Of a few collisions the first is no transient: a window that began after it would hold the others alone.
+static void a_few_collisions_begin_no_window(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    const bt_run_totals t = totals(600);
+    char *json = summary_of(&c, 600, &t, FLOES, early_collision);
+    assert_true(atof(json_value(json, "start_s")) < 1);
+    assert_true(atof(json_value(json, "n_independent")) < 4);
+    free(json);
+}
+
 static void slow_ripple(bt_sample *s, int i) { set_forces(s, 1000 + 10 * sin(2 * BT_PI * i / 200.0), 1000); }
 
 /// A slow wave of one per cent of the mean leaves nothing to doubt.
@@ -483,6 +502,7 @@ int main(void)
         cmocka_unit_test(a_body_that_met_no_ice_tells_nothing),
         cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
         cmocka_unit_test(a_few_collisions_are_few_samples),
+        cmocka_unit_test(a_few_collisions_begin_no_window),
         cmocka_unit_test(a_small_wave_needs_no_longer_run),
         cmocka_unit_test(a_branch_that_has_parted_has_no_mean),
         cmocka_unit_test(the_width_is_that_of_the_window),
