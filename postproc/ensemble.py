@@ -38,7 +38,8 @@ def member(e, m):
     return {
         "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
         "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
-        "independent": independent if np.isfinite(independent) else within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
+        "independent": independent if np.isfinite(independent) else within.n_eff,
+        "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
     }
 
 

@@ -7,7 +7,8 @@ import loads_text
 from ensemble_read import listed
 from text_table import FAR, number, pair, scale, table
 
-DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "few": "F", "stopped": "X", "other": "O"}
+DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "few": "F", "stopped": "X",
+                 "other": "O"}
 
 
 def doubts(c):

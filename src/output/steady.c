@@ -89,9 +89,9 @@ static double stretches(const double *x, int64_t n, double mean, double length)
     return !pause ? INFINITY : squares > 0 ? sum * sum / squares : 0;
 }
 
-/// The same of a window, with a long push as one stretch: up to a fortieth of the window, so that contact without end is
-/// worth twice as many as are asked for. The correlation alone, which short collisions make short, would take a push of
-/// some minutes for hundreds.
+/// The same of a window, with a long push as one stretch: up to a fortieth of the window, so that contact without end
+/// is worth twice as many as are asked for. The correlation alone, which short collisions make short, would take a push
+/// of some minutes for hundreds.
 static double contacts(const double *x, const bt_mean *m)
 {
     return stretches(x, m->n, m->mean, bt_max(2 * m->tau, (double)m->n / (2 * BT_STEADY_INDEPENDENT)));

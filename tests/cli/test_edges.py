@@ -274,7 +274,8 @@ def test_a_lead_up_to_the_front_of_a_window_takes_floes_on_the_seam(tmp_path):
     """Red when those stay whose centres lie at the back: their other half is in the channel."""
     case = {"run": {"dt": 1, "duration": 20},
             "domain": {"frame": "geographic", "length": 1000, "width": 600, "ends": "moving", "sides": "periodic"},
-            "ice": {"concentration": 0.8, "size": 40, "thickness": 1}, "body": {"shape": "disc", "length": 60, "draft": 30},
+            "ice": {"concentration": 0.8, "size": 40, "thickness": 1},
+            "body": {"shape": "disc", "length": 60, "draft": 30},
             "tow": {"mode": "speed", "speed": 0.5}, "lead": {"mode": "channel", "width": 80, "length": 600}}
     r = run(tmp_path, case, "--steps", 1)
     offsets, vertices, pose = (r.dataset(n) for n in ("/floes/offsets", "/floes/vertices", "/frames/pose"))
@@ -304,7 +305,8 @@ def test_what_a_seed_or_a_frame_decided(tmp_path):
 
 def test_a_window_of_the_basin_faces_its_way_points(tmp_path):
     """Red with 20 m ahead of the body, and 30 behind, as if it were towed towards x."""
-    case = {"run": {"dt": 0.1, "duration": 20}, "domain": {"length": 50, "ends": "moving"}, "ice": {"concentration": 0.5},
+    case = {"run": {"dt": 0.1, "duration": 20}, "domain": {"length": 50, "ends": "moving"},
+            "ice": {"concentration": 0.5},
             "tow": {"mode": "line", "speed": 0.1, "waypoints": [[-60, 0]]}}
     for at, x in ((-60, 30), (60, 20)):
         r = run(tmp_path, changed(case, tow__waypoints=[[at, 0]]), "--steps", 1, name=str(x))
