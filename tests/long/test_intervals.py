@@ -81,8 +81,9 @@ LIGHT = {
 
 
 def test_the_start_that_is_found_leaves_the_mean_of_light_ice(tmp_path):
-    """200 fields each of a ship in 2, 5, 10 and 20 % ice, from the start that is found and from the end of the ramp on.
-    −1.4, −3.8, −2.0 and −1.2 %; red at −31 to −5 % when the window begins where the variance of the mean is least."""
+    """200 fields each of a ship in 2, 5, 10 and 20 % ice, from the start that is found and from the end of the ramp on:
+    the same. Red at −31 to −5 % when the window begins where the variance of the mean is least, and at −3.8 % where
+    ranks alone say whether it may."""
     concentrations = [0.02, 0.05, 0.1, 0.2]
     (tmp_path / "light.yml").write_text(json.dumps(LIGHT))
     means = []
@@ -99,4 +100,4 @@ def test_the_start_that_is_found_leaves_the_mean_of_light_ice(tmp_path):
     for c, f, w in zip(concentrations, found, whole):
         print(f"{c:.2f}: found {f.mean():.4g} N, whole {w.mean():.4g} N: {100 * (f.mean() / w.mean() - 1):+.1f} %, "
               f"begins later in {100 * np.mean(f != w):.0f} % of the fields")
-    assert np.all(np.abs(found.mean(1) / whole.mean(1) - 1) < 0.05)
+    assert np.all(np.abs(found.mean(1) / whole.mean(1) - 1) < 0.02)
