@@ -50,8 +50,9 @@ int64_t bt_stats_start_step(int64_t n);
 /// Start of the steady window of x[n]: that of MSER-5 (White 1997, Simulation 69), the truncation point that minimises
 /// the variance of the mean of batches of 5, searched over the first half of what follows `first` in steps of
 /// bt_stats_start_step(n - first); but only where ranks, which single large values do not decide, tell what it cuts off
-/// from the rest, and their means or standard deviations differ by more than `material` of the rest's mean: else
-/// `first`.
+/// from the rest, and its mean differs, or its standard deviation is larger, by more than `material` of the rest's
+/// mean: else `first`, as for n - first < BT_TREND_LEAST. A transient of less than 2 % of the series is not told from a
+/// large value, however large.
 /// Returns an index in [first, bt_stats_last_start(n, first)].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material);
 

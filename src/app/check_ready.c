@@ -111,10 +111,11 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
 }
 
 /// Where the tow leads in the ice, which water and wind move; a lead goes with it.
-static void warn_of_track(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+static void warn_of_track(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings)
 {
     if (n->count < 1) return;
     bt_track t = bt_setup_track(c, n->size, n->thickness, n->concentration);
+    if (f->outlines.region[0] < f->outlines.region[2]) t.region = f->outlines.region;
     bt_case_warn_lead(c, t.drift[0], t.drift[1], warnings);
     bt_track_warn(c, &t, warnings);
     if (c->domain.ends == BT_BOUND_MOVING) {
@@ -131,7 +132,7 @@ static void warn_of_track(const bt_case *c, const bt_check_ice *n, bt_errors *wa
 
 void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings)
 {
-    warn_of_track(c, n, warnings);
+    warn_of_track(c, f, n, warnings);
     const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
     bt_arch_warn(&arch, warnings);
     const bt_packing packing = bt_packing_of(c, n->concentration);

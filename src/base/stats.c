@@ -239,8 +239,8 @@ static bool is_transient(const double *x, int64_t n, int64_t start, double mater
 // only where a second test, which large values cannot decide, finds another state before it: the ranks of batches, or
 // of their distances from the median (a body that swings on its line). A test on the values with their own variances
 // halves the error at best. So it is −2.2, −2.5, −1.8 and −1.0 % in 200 fields each of 2, 5, 10 and 20 % ice, while of
-// the excess of 23 % with which tows in 95 % ice begin 7 % are left, as by MSER alone. Fields that meet few floes, where
-// most of that arises, are not searched at all (output/steady.c).
+// the excess of 23 % with which tows in 95 % ice begin 7 % are left, as by MSER alone. Where a start leaves few floes,
+// from which most of that arises, it is not taken (output/steady.c).
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material)
 {
     if (first < 0) first = 0;

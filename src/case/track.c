@@ -86,13 +86,14 @@ static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, boo
     const double first[2] = {c->domain.x0, c->domain.y0}, extent[2] = {c->domain.length, c->domain.width};
     double low[2], high[2], period[2] = {0};
     bt_case_ice_region(c, low, high);
+    for (int k = 0; k < 2 && t->region; k++) low[k] = t->region[k], high[k] = t->region[2 + k];
     for (int k = 0; k < 2; k++) {
         // up to a wall, which holds ice that drifts, and the body
         const bool wall = kind[k] == BT_BOUND_WALL, wraps = bt_bound_wraps(kind[k]);
         const bool filled = wraps && high[k] - low[k] > extent[k] - size;
         if (filled || (wall && low[k] < first[k] + size)) low[k] = -INFINITY;
         if (filled || (wall && high[k] > first[k] + extent[k] - size)) high[k] = INFINITY;
-        if (wraps && !filled) period[k] = extent[k], *gap = true;
+        if (wraps && !filled) period[k] = extent[k];
     }
     int64_t last = t->n;
     for (int64_t i = 0; i < t->n; i++) {
@@ -100,11 +101,13 @@ static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, boo
         bool in = true;
         for (int k = 0; k < 2; k++) {
             const double past = at[k] - low[k];
-            in = in && (period[k] > 0 ? past - period[k] * floor(past / period[k]) <= high[k] - low[k]
-                                      : past >= 0 && at[k] <= high[k]);
+            const bool within = period[k] > 0 ? past - period[k] * floor(past / period[k]) <= high[k] - low[k]
+                                              : past >= 0 && at[k] <= high[k];
+            in = in && within;
+            *gap = *gap || (!within && period[k] > 0 && last < t->n);
         }
+        if (*gap) return last;
         if (in) last = i;
-        else if (last < t->n && *gap) return last;
     }
     return last + 1 < t->n ? last : t->n;
 }

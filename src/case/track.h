@@ -20,6 +20,7 @@ typedef struct bt_track {
     int64_t n;
     const double *time, *x, *y; ///< [n] s, m; NaN where not known
     double drift[2];            ///< of a planned one: how far the ice drifts in the whole run, m
+    const double *region;       ///< [4] x_min, y_min, x_max, y_max of the ice, m; NULL = that of the case
 } bt_track;
 
 /// Largest speed from one point to the next, m/s.

@@ -243,6 +243,10 @@ static const row rows[] = {
     {"ice/outside_area", "m2", "area of floes outside the ice region", "one"},
     {"ice/own_area", "m2", "area that the concentration of a field file refers to", "one"},
     {"ice/region_area", "m2", "area of the case's ice region, beside it", "one"},
+    {"region/x_min", "m", "ice region of a field file, 0 as the other three for others", "one"},
+    {"region/y_min", "m", "the same, y", "one"},
+    {"region/x_max", "m", "its other end, x", "one"},
+    {"region/y_max", "m", "the same, y", "one"},
 };
 
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)

@@ -146,6 +146,14 @@ static const bt_state_row ice_rows[] = {
     FIELD(F64, "region_area", outlines.region_area),
 };
 
+/// Nor these: then the domain.
+static const bt_state_row region_rows[] = {
+    FIELD(F64, "x_min", outlines.region[0]),
+    FIELD(F64, "y_min", outlines.region[1]),
+    FIELD(F64, "x_max", outlines.region[2]),
+    FIELD(F64, "y_max", outlines.region[3]),
+};
+
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
 
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
@@ -634,6 +642,7 @@ static void save_field_head(const bt_field *f, bt_snapshot *s)
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
     bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
     bt_snapshot_add_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
+    bt_snapshot_add_rows(s, "region", region_rows, N_OF(region_rows), f);
     bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
     bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
@@ -669,6 +678,7 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
     }
     if (bt_snapshot_find(s, "ice/bare")) bt_snapshot_take_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
     else f->outlines.bare = f->outlines.read; // not known: no warning
+    if (bt_snapshot_find(s, "region/x_min")) bt_snapshot_take_rows(s, "region", region_rows, N_OF(region_rows), f);
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
     f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);

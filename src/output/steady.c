@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/path.h"
@@ -68,33 +69,64 @@ static bool has_parted(const bt_run_totals *t, bt_reported_series k)
     return parted;
 }
 
-/// How many equal stretches of contact the mean of x[n] is worth: with R_i the sum over a stretch between two steps of
-/// next to nothing, (Σ R_i)² / Σ R_i². A stretch of more steps than `length` is cut into pieces of that. Infinite for a
-/// series without a pause. Where a body meets floes one by one, nearly all steps are independent zeros:
-/// their number says nothing of a mean that is made of three collisions.
-static double stretches(const double *x, int64_t n, double mean, double length)
+/// How many equal stretches the sum of |x[n]| above `base` is worth: with R_i the sum over a stretch between two steps
+/// of next to nothing, (Σ R_i)² / Σ R_i². A stretch of more steps than `length` is cut into pieces of that.
+static double stretches(const double *x, int64_t n, double base, double length)
 {
-    double sum = 0, squares = 0, piece = 0;
+    double mean = 0, sum = 0, squares = 0, piece = 0;
     int64_t steps = 0;
-    bool pause = false;
+    for (int64_t i = 0; i < n; i++) mean += bt_max(0, fabs(x[i]) - base) / (double)n;
     for (int64_t i = 0; i <= n; i++) {
-        const bool rest = i == n || fabs(x[i]) <= BT_STEADY_MATERIAL * fabs(mean);
-        pause |= i < n && rest;
+        const double above = i < n ? bt_max(0, fabs(x[i]) - base) : 0;
+        const bool rest = above <= BT_STEADY_MATERIAL * mean;
         if (rest || (double)steps >= length) {
-            sum += fabs(piece), squares += piece * piece;
+            sum += piece, squares += piece * piece;
             piece = 0, steps = 0;
         }
-        if (!rest) piece += x[i], steps++;
+        if (!rest) piece += above, steps++;
     }
-    return !pause ? INFINITY : squares > 0 ? sum * sum / squares : 0;
+    return squares > 0 ? sum * sum / squares : 0;
 }
 
-/// The same of a window, with a long push as one stretch: up to a fortieth of the window, so that contact without end
-/// is worth twice as many as are asked for. The correlation alone, which short collisions make short, would take a push
-/// of some minutes for hundreds.
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/// What |x[n]| is above in nine steps of ten: a floe that is carried on the bow, say.
+static double always_there(const double *x, int64_t n)
+{
+    if (n < 1) return 0;
+    double *sorted = bt_alloc((size_t)n, sizeof *sorted);
+    for (int64_t i = 0; i < n; i++) sorted[i] = fabs(x[i]);
+    qsort(sorted, (size_t)n, sizeof *sorted, ascending);
+    const double base = sorted[n / 10];
+    free(sorted);
+    return base;
+}
+
+/// Stretches of contact that the mean of a window of the ice resistance is worth. A long push is one, up to a sixtieth
+/// of the window, so that contact without end is worth three times as many as are asked for, and what is always there
+/// is none. The correlation, which short collisions make short, would take a push of some minutes for hundreds: where a
+/// body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of three hits.
 static double contacts(const double *x, const bt_mean *m)
 {
-    return stretches(x, m->n, m->mean, bt_max(2 * m->tau, (double)m->n / (2 * BT_STEADY_INDEPENDENT)));
+    return stretches(x, m->n, always_there(x, m->n),
+                     bt_max(2 * m->tau, (double)m->n / (3 * BT_STEADY_INDEPENDENT)));
+}
+
+/// Does a series vary by more than matters, or is it too short to tell?
+static bool varies(const bt_mean *m)
+{
+    return m->n < BT_STEADY_INDEPENDENT || !(m->sd <= BT_STEADY_MATERIAL * fabs(m->mean));
+}
+
+static bool pauses(const double *x, const bt_mean *m)
+{
+    for (int64_t i = 0; i < m->n; i++)
+        if (fabs(x[i]) <= BT_STEADY_MATERIAL * fabs(m->mean)) return true;
+    return false;
 }
 
 /// Index of the window's first step; h->n without a window.
@@ -107,14 +139,17 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     const char *settles = NULL;
     if (s->given || earliest >= h->n) return first;
     const double *ice = h->column[BT_COL_ICE];
-    const bt_mean all = bt_stats_mean(ice + earliest, h->n - earliest);
-    const bool few = contacts(ice + earliest, &all) < BT_STEADY_INDEPENDENT;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
-        // A few collisions tell nothing of a transient, nor does a tow force that is their sum with a constant.
+        // Where a few collisions are left nothing tells them from those before, nor in a tow force that is their sum
+        // with a constant.
         const bool collisions = k == BT_REPORTED_ICE || (k == BT_REPORTED_TOW && c->tow.mode == BT_TOW_SPEED);
-        if ((few && collisions) || !is_there(x, earliest, h->n)) continue;
+        if (!is_there(x, earliest, h->n)) continue;
         const int64_t start = bt_stats_steady_start(x, h->n, earliest, BT_STEADY_MATERIAL);
+        if (start > earliest && collisions) {
+            const bt_mean left = bt_stats_mean(ice + start, h->n - start);
+            if (contacts(ice + start, &left) < BT_STEADY_INDEPENDENT) continue;
+        }
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
         if (start > earliest && start == bt_stats_last_start(h->n, earliest)) settles = reported[k].name;
@@ -147,12 +182,13 @@ static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
     }
     bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
     const double *x = h->column[BT_COL_ICE] + s->first;
-    s->stretches = contacts(x, ice);
+    s->stretches = varies(ice) ? contacts(x, ice) : INFINITY;
     const double most = s->stretches < BT_STEADY_INDEPENDENT ? s->stretches
-                                                             : stretches(x, s->n, ice->mean, 2 * ice->tau);
+                        : pauses(x, ice)                     ? stretches(x, s->n, 0, 2 * ice->tau)
+                                                             : INFINITY;
     if (most < ice->n_eff && (most > 0 || t->concentration > 0)) ice->n_eff = most;
     // A body that met no ice has a mean of 0, and nothing says how far from it that of a longer tow is.
-    if (s->stretches == 0 && t->concentration > 0) ice->se = ice->low = ice->high = NAN;
+    if (ice->sd == 0 && ice->mean == 0 && t->concentration > 0) ice->se = ice->low = ice->high = NAN;
     for (int64_t i = s->first; i < h->n; i++) {
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
@@ -325,7 +361,9 @@ static double come_on(const bt_steady *s, const bt_history *h, const bt_case *c,
 static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
 {
     const double *x = h->column[BT_COL_IN_ICE_X], *y = h->column[BT_COL_IN_ICE_Y];
-    const bt_track t = {.n = h->n, .time = h->column[BT_COL_TIME], .x = x, .y = y};
+    const double *region = totals->outlines.region;
+    const bt_track t = {.n = h->n, .time = h->column[BT_COL_TIME], .x = x, .y = y,
+                        .region = region[0] < region[2] ? region : NULL};
     bt_errors found = {0};
     bt_track_warn(c, &t, &found);
     for (size_t k = 0; k < found.n; k++) decide(s, BT_NOT_STEADY, "%s", found.text[k]);
@@ -374,7 +412,8 @@ static void judge_trends(bt_steady *s)
 /// little.
 static void judge_contact(bt_steady *s, const bt_run_totals *t)
 {
-    s->met_no_ice = t->concentration > 0 && s->stretches == 0;
+    const bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
+    s->met_no_ice = t->concentration > 0 && ice->mean == 0 && ice->sd == 0;
     if (s->met_no_ice && t->lead.mode == BT_LEAD_CHANNEL)
         decide(s, BT_TOO_SHORT,
                "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it that "
@@ -383,22 +422,26 @@ static void judge_contact(bt_steady *s, const bt_run_totals *t)
     else if (s->met_no_ice)
         decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
                s->start, s->end, 100 * t->concentration);
-    else if (s->stretches > 0 && s->stretches < BT_STEADY_INDEPENDENT)
+    else if (ice->mean != 0 && s->stretches < BT_STEADY_INDEPENDENT)
         decide(s, BT_TOO_SHORT,
                "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
                "worth %.2g equal ones, fewer than %d: run longer",
                s->start, s->end, s->stretches, BT_STEADY_INDEPENDENT);
 }
 
-/// The load that is known worst, of those that vary.
-static void judge_length(bt_steady *s, double dt)
+/// The load that is known worst, of those that vary; and a body on a line that has had no time to swing.
+static void judge_length(bt_steady *s, const bt_case *c, double dt)
 {
+    const double swings = BT_RAMP_PERIODS * bt_case_line_period(c), length = (double)s->n * dt;
+    if (length < swings * (1 - 1e-9))
+        decide(s, BT_TOO_SHORT,
+               "the window of %g s is shorter than %g swings of the body on its line (%.3g s each): run longer", length,
+               BT_RAMP_PERIODS, bt_case_line_period(c));
     const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
-        const bool varies = !(r->mean.sd <= BT_STEADY_MATERIAL * fabs(r->mean.mean));
         const double n = (double)s->n / (2 * r->mean.tau); // stretches of contact are judged before
-        if (!reported[k].load || !r->present || !varies || n >= BT_STEADY_INDEPENDENT) continue;
+        if (!reported[k].load || !r->present || !varies(&r->mean) || n >= BT_STEADY_INDEPENDENT) continue;
         if (!worst || r->mean.tau > worst->mean.tau) worst = r;
     }
     if (!worst) return;
@@ -443,5 +486,5 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     judge_track(s, h, c, t);
     judge_trends(s);
     judge_contact(s, t);
-    judge_length(s, t->dt);
+    judge_length(s, c, t->dt);
 }

@@ -297,6 +297,33 @@ def test_the_region_of_a_field_file_is_its_own(tmp_path):
         assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(400, rel=0.02), text
 
 
+def test_a_gap_of_a_field_file_is_seen(tmp_path):
+    """Red as steady: the case of the file has no ice region of its own. A resumed run knows it as well."""
+    base = changed(ROUND, domain__ends="moving", run__duration=600, ice__x_max=100)
+    assert call("field", write_case(tmp_path, base), "-o", "field.h5", cwd=tmp_path).returncode == DONE
+    case = changed(base, ice={"field": "field.h5", "size": 25})
+    checked = call("check", write_case(tmp_path, case), cwd=tmp_path).stdout
+    r = run(tmp_path, case, "--quiet", "--steps", 200)
+    assert call("resume", "out", "--quiet", cwd=tmp_path).returncode == DONE
+    reason = json.loads((r.dir / "summary.json").read_text())["window"]["reason"]
+    for text in (checked, reason):
+        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and comes into", text)[1]) == pytest.approx(200, rel=0.02)
+
+
+def test_a_strip_of_ice_is_left_through_the_open_end(tmp_path):
+    """Red with the remedy of a gap: the body stays in the strip, and leaves it where the domain ends."""
+    case = changed(ROUND, domain__ends="open", domain__sides="periodic", ice__y_min=-75, ice__y_max=75)
+    checked = call("check", write_case(tmp_path, case)).stdout
+    assert f"{LEFT} 400" in checked.replace("399", "400") and "set domain.ends: moving, or end the run" in checked
+
+
+def test_a_window_of_less_than_two_swings_is_too_short(tmp_path):
+    """Red as steady with two steps: what does not vary within them."""
+    r = run(tmp_path, changed(BERG, ice={"concentration": 0}, output__window_start=1490), "--quiet")
+    assert r.summary["window"]["verdict"] == "too short"
+    assert "is shorter than 2 swings of the body on its line" in r.summary["window"]["reason"]
+
+
 def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
     """A vessel that pulls next to nothing, in open water, where nothing holds the body."""
     case = changed(BERG, ice={"concentration": 0}, run__duration=600, tow={

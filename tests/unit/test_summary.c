@@ -387,6 +387,24 @@ static void early_collision(bt_sample *s, int i)
     if (i >= 40 && i < 160) set_forces(s, i == 50 ? 1e6 : 5000, 121 + 10 * noise(i)); // and a push after it
 }
 
+static void carried(bt_sample *s, int i) { set_forces(s, 500 + (i % 100 == 0 ? 1000 : 0) + noise(i), 121); }
+static void giant(bt_sample *s, int i) { set_forces(s, 100 + 10 * noise(i) + (i == 400 ? 1e6 : 0), 121); }
+
+/// Nor is a floe that is carried on the bow all the time more than its hits, or a contact with one giant step.
+static void contact_without_a_pause_may_be_few_samples(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    const bt_run_totals t = totals(600);
+    for (int k = 0; k < 3; k++) {
+        char *json = summary_of(&c, 600, &t, FLOES, k == 0 ? carried : k == 1 ? giant : sound_tow);
+        assert_string_equal(json_value(json, "verdict"), k < 2 ? "\"too short\"" : "\"steady\"");
+        assert_true((strstr(json, "a few stretches of contact") != NULL) == (k < 2));
+        free(json);
+    }
+}
+
 /// Of a few collisions the first is no transient: a window that began after it would hold the others alone.
 static void a_few_collisions_begin_no_window(void **state)
 {
@@ -503,6 +521,7 @@ int main(void)
         cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
         cmocka_unit_test(a_few_collisions_are_few_samples),
         cmocka_unit_test(a_few_collisions_begin_no_window),
+        cmocka_unit_test(contact_without_a_pause_may_be_few_samples),
         cmocka_unit_test(a_small_wave_needs_no_longer_run),
         cmocka_unit_test(a_branch_that_has_parted_has_no_mean),
         cmocka_unit_test(the_width_is_that_of_the_window),
