@@ -39,7 +39,7 @@ DOUBTS = {
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
                 "solved",
     "short": "no window, or fewer than 20 independent samples in it",
-    "few": "the body met no ice in its window, or made fewer than 20 stretches of contact",
+    "few": "the body met no ice in its window, or little: contact worth fewer than 10 equal stretches",
     "stopped": "the run stopped early",
     "other": "a warning of another kind",
 }

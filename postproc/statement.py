@@ -31,7 +31,7 @@ DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
     "unsteady": "members whose window is not steady",
     "short": "members with fewer than 20 independent samples",
-    "few": "members whose mean is made of fewer than 20 stretches of contact, or of none",
+    "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
     "stopped": "members that stopped early"
 }
 #: what stands in the line of what the values hold for: case key, words in front and behind

@@ -107,13 +107,13 @@ static double always_there(const double *x, int64_t n)
 }
 
 /// Stretches of contact that the mean of a window of the ice resistance is worth. A long push is one, up to a sixtieth
-/// of the window, so that contact without end is worth three times as many as are asked for, and what is always there
+/// of the window, so that contact without end is worth six times as many as are asked for, and what is always there
 /// is none. The correlation, which short collisions make short, would take a push of some minutes for hundreds: where a
 /// body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of three hits.
 static double contacts(const double *x, const bt_mean *m)
 {
     return stretches(x, m->n, always_there(x, m->n),
-                     bt_max(2 * m->tau, (double)m->n / (3 * BT_STEADY_INDEPENDENT)));
+                     bt_max(2 * m->tau, (double)m->n / (6 * BT_STEADY_STRETCHES)));
 }
 
 /// Does a series vary by more than matters, or is it too short to tell?
@@ -148,7 +148,7 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
         const int64_t start = bt_stats_steady_start(x, h->n, earliest, BT_STEADY_MATERIAL);
         if (start > earliest && collisions) {
             const bt_mean left = bt_stats_mean(ice + start, h->n - start);
-            if (contacts(ice + start, &left) < BT_STEADY_INDEPENDENT) continue;
+            if (contacts(ice + start, &left) < BT_STEADY_STRETCHES) continue;
         }
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
@@ -183,9 +183,9 @@ static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
     bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
     const double *x = h->column[BT_COL_ICE] + s->first;
     s->stretches = varies(ice) ? contacts(x, ice) : INFINITY;
-    const double most = s->stretches < BT_STEADY_INDEPENDENT ? s->stretches
-                        : pauses(x, ice)                     ? stretches(x, s->n, 0, 2 * ice->tau)
-                                                             : INFINITY;
+    const double most = s->stretches < BT_STEADY_STRETCHES ? s->stretches
+                        : pauses(x, ice)                   ? stretches(x, s->n, 0, 2 * ice->tau)
+                                                           : INFINITY;
     if (most < ice->n_eff && (most > 0 || t->concentration > 0)) ice->n_eff = most;
     // A body that met no ice has a mean of 0, and nothing says how far from it that of a longer tow is.
     if (ice->sd == 0 && ice->mean == 0 && t->concentration > 0) ice->se = ice->low = ice->high = NAN;
@@ -396,7 +396,7 @@ static void judge_trends(bt_steady *s)
         const bt_reported *r = &s->series[k];
         const bt_trend *t = &r->trend;
         // that a few collisions came early or late is no trend
-        if (s->stretches < BT_STEADY_INDEPENDENT && (k == BT_REPORTED_ICE || k == BT_REPORTED_TOW)) continue;
+        if (s->stretches < BT_STEADY_STRETCHES && (k == BT_REPORTED_ICE || k == BT_REPORTED_TOW)) continue;
         if (!r->present || !t->significant || !(fabs(t->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
         decide(s, BT_NOT_STEADY,
                "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the "
@@ -422,11 +422,11 @@ static void judge_contact(bt_steady *s, const bt_run_totals *t)
     else if (s->met_no_ice)
         decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
                s->start, s->end, 100 * t->concentration);
-    else if (ice->mean != 0 && s->stretches < BT_STEADY_INDEPENDENT)
+    else if (ice->mean != 0 && s->stretches < BT_STEADY_STRETCHES)
         decide(s, BT_TOO_SHORT,
                "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
                "worth %.2g equal ones, fewer than %d: run longer",
-               s->start, s->end, s->stretches, BT_STEADY_INDEPENDENT);
+               s->start, s->end, s->stretches, BT_STEADY_STRETCHES);
 }
 
 /// The load that is known worst, of those that vary; and a body on a line that has had no time to swing.
