@@ -108,12 +108,12 @@ static double always_there(const double *x, int64_t n)
 
 /// Stretches of contact that the mean of a window of the ice resistance is worth. A long push is one, up to a sixtieth
 /// of the window, so that contact without end is worth six times as many as are asked for, and what is always there
-/// is none. The correlation, which short collisions make short, would take a push of some minutes for hundreds: where a
-/// body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of three hits.
+/// is none. Not cut to the correlation: short collisions make that short, and a push of some minutes would be hundreds;
+/// where a body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of three
+/// hits. What is slow in dense ice is in n_eff.
 static double contacts(const double *x, const bt_mean *m)
 {
-    return stretches(x, m->n, always_there(x, m->n),
-                     bt_max(2 * m->tau, (double)m->n / (6 * BT_STEADY_STRETCHES)));
+    return stretches(x, m->n, always_there(x, m->n), (double)m->n / (6 * BT_STEADY_STRETCHES));
 }
 
 /// Does a series vary by more than matters, or is it too short to tell?
