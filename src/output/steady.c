@@ -107,10 +107,10 @@ static double always_there(const double *x, int64_t n)
 }
 
 /// Stretches of contact that the mean of a window of the ice resistance is worth. A long push is one, up to a sixtieth
-/// of the window, so that contact without end is worth six times as many as are asked for, and what is always there
-/// is none. Not cut to the correlation: short collisions make that short, and a push of some minutes would be hundreds;
-/// where a body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of three
-/// hits. What is slow in dense ice is in n_eff.
+/// of the window, so that contact without end is worth six times as many as are asked for, and what is always there is
+/// none. Not cut to the correlation: short collisions make that short, and a push of some minutes would be hundreds;
+/// where a body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of
+/// three hits. What is slow in dense ice is in n_eff.
 static double contacts(const double *x, const bt_mean *m)
 {
     return stretches(x, m->n, always_there(x, m->n), (double)m->n / (6 * BT_STEADY_STRETCHES));
