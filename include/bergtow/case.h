@@ -330,8 +330,7 @@ static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 int64_t bt_case_steps(const bt_case *c);
 
 /// The window of the statistics begins there or later: output.window_start, or the end of the ramp, and where that is
-/// short for a body on its line, two periods later, but halfway to the end of the run at
-/// most, s.
+/// short for a body on its line, two periods later, but halfway to the end of the run at most, s.
 double bt_case_earliest_window(const bt_case *c);
 
 /// Reference speed of the solver tolerance, m/s (> 0).

@@ -37,6 +37,12 @@ typedef struct bt_outline_counts {
     double region[4]; ///< of a field file: its ice region, x_min, y_min, x_max, y_max, m; all 0 where it does not say
 } bt_outline_counts;
 
+/// The ice region of a field file that names it, [4]; NULL otherwise.
+static inline const double *bt_outline_region(const bt_outline_counts *o)
+{
+    return o->region[0] < o->region[2] ? o->region : NULL;
+}
+
 typedef struct bt_field {
     bt_idx n;              ///< floes
     int64_t *offsets;      ///< [n+1] first vertex of each floe

@@ -52,8 +52,7 @@ int64_t bt_stats_start_step(int64_t n);
 /// bt_stats_start_step(n - first); but only where ranks, which single large values do not decide, tell what it cuts off
 /// from the rest, and its mean differs, or its standard deviation is larger, by more than `material` of the rest's
 /// mean: else `first`, as for n - first < BT_TREND_LEAST. A transient of less than 2 % of the series is not told from a
-/// large value, however large.
-/// Returns an index in [first, bt_stats_last_start(n, first)].
+/// large value, however large. Returns an index in [first, bt_stats_last_start(n, first)].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material);
 
 /// The last start that it looks at: a minimum there is the end of the search, and no minimum of the series.

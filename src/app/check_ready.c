@@ -115,7 +115,7 @@ static void warn_of_track(const bt_case *c, const bt_field *f, const bt_check_ic
 {
     if (n->count < 1) return;
     bt_track t = bt_setup_track(c, n->size, n->thickness, n->concentration);
-    if (f->outlines.region[0] < f->outlines.region[2]) t.region = f->outlines.region;
+    t.region = bt_outline_region(&f->outlines);
     bt_case_warn_lead(c, t.drift[0], t.drift[1], warnings);
     bt_track_warn(c, &t, warnings);
     if (c->domain.ends == BT_BOUND_MOVING) {

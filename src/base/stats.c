@@ -29,6 +29,7 @@
 // parts the means of the two halves by three standard errors of their difference is seen in 89 to 92 %, 90 % in the
 // mean (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
+#include "base/ascending.h"
 #include "base/elementary.h"
 
 #include <math.h>
@@ -41,7 +42,6 @@
 #define TREND_WAVES 6
 #define TREND_FACTOR 1.95
 #define BATCH 5
-#define COARSE 96
 #define FINE 384
 
 /// Mean in two passes: the second takes the rounding of the first out.
@@ -187,12 +187,6 @@ static bool ranks_differ(const double *y, int count, int first, bool larger, dou
     return between > accept * sqrt(variance * (1.0 / first + 1.0 / (count - first)));
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double rms_about(const double *x, int64_t n, double centre)
 {
     double sum = 0;
@@ -207,7 +201,7 @@ static double beyond(double x, double limit) { return fabs(x) > limit ? x : 0; }
 /// matter (stats.h)? In coarse batches a slow change is no long correlation, in fine ones a short swing has many.
 static bool is_transient(const double *x, int64_t n, int64_t start, double material)
 {
-    static const struct { int batches; double accept; } look[] = {{COARSE, 3.2}, {FINE, 4}};
+    static const struct { int batches; double accept; } look[] = {{BATCHES, 3.2}, {FINE, 4}};
     double z[FINE], sorted[FINE];
     const double cut = mean_of(x, start), rest = mean_of(x + start, n - start), limit = material * fabs(rest);
     const bool level = fabs(cut - rest) > limit,
@@ -219,7 +213,7 @@ static bool is_transient(const double *x, int64_t n, int64_t start, double mater
         if (level && ranks_differ(z, count, first, cut > rest, look[i].accept)) return true;
         if (!swing) continue;
         for (int k = 0; k < left; k++) sorted[k] = z[first + k];
-        qsort(sorted, (size_t)left, sizeof *sorted, ascending);
+        qsort(sorted, (size_t)left, sizeof *sorted, bt_ascending);
         for (int k = 0; k < count; k++) z[k] = beyond(z[k] - sorted[left / 2], limit);
         for (int k = 0; k < count; k++) z[k] = fabs(z[k]);
         if (ranks_differ(z, count, first, true, look[i].accept)) return true;

@@ -17,6 +17,7 @@
 #include "bergtow/world.h"
 #include "field/field_make.h"
 #include "force/forces.h"
+#include "base/ascending.h"
 #include "base/elementary.h"
 #include "base/rng.h"
 
@@ -66,17 +67,11 @@ static void add_surroundings(bt_world *w, const bt_region *y, double thick)
     }
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double *p = a, *q = b;
-    return (*p > *q) - (*p < *q);
-}
-
 static double median_area(const bt_field *f)
 {
     double *sorted = bt_alloc((size_t)f->n, sizeof *sorted);
     memcpy(sorted, f->area, (size_t)f->n * sizeof *sorted);
-    qsort(sorted, (size_t)f->n, sizeof *sorted, ascending);
+    qsort(sorted, (size_t)f->n, sizeof *sorted, bt_ascending);
     const double median = sorted[f->n / 2];
     free(sorted);
     return median;

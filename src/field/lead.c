@@ -352,13 +352,13 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
     if (status != BT_OK || !outside) return status;
     bt_case of = *c; // with the region that the concentration refers to
     if (c->ice.field) {
-        const double *r = f->outlines.region;
-        of.ice.x_min = r[0], of.ice.y_min = r[1], of.ice.x_max = r[2], of.ice.y_max = r[3];
-        if (!(r[0] < r[2])) { // a file that does not say: as if the lead took as large a share in it as beyond it
+        const double *r = bt_outline_region(&f->outlines);
+        if (!r) { // a file that does not say: as if the lead took as large a share in it as beyond it
             f->concentration = s->concentration_before * (bt_field_floe_area(f) / whole);
             s->concentration_after = NAN;
             return BT_OK;
         }
+        of.ice.x_min = r[0], of.ice.y_min = r[1], of.ice.x_max = r[2], of.ice.y_max = r[3];
     }
     bt_region y;
     status = bt_region_init(&y, &of, 0, err);

@@ -13,6 +13,7 @@
 #include "step/window.h"
 #include "case/case_check.h"
 #include "case/track.h"
+#include "base/ascending.h"
 #include "base/elementary.h"
 #include "output/summary.h"
 
@@ -88,19 +89,13 @@ static double stretches(const double *x, int64_t n, double base, double length)
     return squares > 0 ? sum * sum / squares : 0;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /// What |x[n]| is above in nine steps of ten: a floe that is carried on the bow, say.
 static double always_there(const double *x, int64_t n)
 {
     if (n < 1) return 0;
     double *sorted = bt_alloc((size_t)n, sizeof *sorted);
     for (int64_t i = 0; i < n; i++) sorted[i] = fabs(x[i]);
-    qsort(sorted, (size_t)n, sizeof *sorted, ascending);
+    qsort(sorted, (size_t)n, sizeof *sorted, bt_ascending);
     const double base = sorted[n / 10];
     free(sorted);
     return base;
@@ -361,9 +356,8 @@ static double come_on(const bt_steady *s, const bt_history *h, const bt_case *c,
 static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *totals)
 {
     const double *x = h->column[BT_COL_IN_ICE_X], *y = h->column[BT_COL_IN_ICE_Y];
-    const double *region = totals->outlines.region;
     const bt_track t = {.n = h->n, .time = h->column[BT_COL_TIME], .x = x, .y = y,
-                        .region = region[0] < region[2] ? region : NULL};
+                        .region = bt_outline_region(&totals->outlines)};
     bt_errors found = {0};
     bt_track_warn(c, &t, &found);
     for (size_t k = 0; k < found.n; k++) decide(s, BT_NOT_STEADY, "%s", found.text[k]);

@@ -14,6 +14,7 @@
 #include "estimate/packing.h"
 #include "geometry/path.h"
 #include "output/summary_window.h"
+#include "base/ascending.h"
 #include "base/elementary.h"
 #include "solve/locked.h"
 
@@ -27,12 +28,6 @@
 #define OVERLAP_LIMIT 0.01
 /// Crush above this fraction of it is reported: outlines stay as they were, and floes that have gone so far into each
 /// other part sideways.
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /// Percentile by linear interpolation between order statistics (numpy's default) of sorted x[n].
 static double percentile(const double *x, int64_t n, double percent)
@@ -80,7 +75,7 @@ static void reduce_window(bt_summary *s, const bt_history *h)
 
     double *sorted = bt_alloc((size_t)n, sizeof *sorted);
     if (n > 0) memcpy(sorted, h->column[BT_COL_ICE] + s->window.first, (size_t)n * sizeof *sorted);
-    qsort(sorted, (size_t)n, sizeof *sorted, ascending);
+    qsort(sorted, (size_t)n, sizeof *sorted, bt_ascending);
     s->p95 = percentile(sorted, n, 95);
     s->p99 = percentile(sorted, n, 99);
     s->peak = percentile(sorted, n, 100);

@@ -82,8 +82,8 @@ LIGHT = {
 
 def test_the_start_that_is_found_leaves_the_mean_of_light_ice(tmp_path):
     """200 fields each of a ship in 2, 5, 10 and 20 % ice, from the start that is found and from the end of the ramp on:
-    the same. Red at −31 to −5 % when the window begins where the variance of the mean is least, and at −3.8 % where
-    ranks alone say whether it may."""
+    the same to about 1 %. Red at −31 to −5 % when the window begins where the variance of the mean is least, and at
+    −3.8 % where ranks alone say whether it may."""
     concentrations = [0.02, 0.05, 0.1, 0.2]
     (tmp_path / "light.yml").write_text(json.dumps(LIGHT))
     means = []
