@@ -10,6 +10,7 @@ converge` on the base case (`--converge FILE`, or converge.json in DIR), from th
 """
 import argparse
 import re
+from collections import Counter
 from pathlib import Path
 
 import command  # first: it has words for packages that are missing
@@ -155,7 +156,9 @@ def of_ensemble(e, of=OF[0], computed=None):
                     "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n,
                     "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows),
                     "failed": e.reasons(FAILED), "failed_beyond": [e.name[m] for m in np.flatnonzero(
-                        e.status == FAILED) if m not in sample], "without_number": lacking, "copies": e.copies}
+                        e.status == FAILED) if m not in sample], "without_number": lacking, "copies": e.copies,
+                    "doubts": dict(Counter(kind for m in rows for kind in e.doubts(m))),
+                    "doubtful": sum(bool(e.doubts(m)) for m in rows)}
 
 
 def of_all(e, some, converge):

@@ -118,6 +118,10 @@ def warnings(found):
     if lacking := found.get("without_number"):
         out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "
                    "intervals.")
+    if doubtful := found.get("doubtful"):
+        kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(found["doubts"].items()))
+        out.append(f"{doubtful} of {found['members']} tows carry warnings and are in the numbers ({kinds}; "
+                   "`ensemble.py` says what each means).")
     if copies := found.get("copies"):
         out.append(f"{len(copies)} of {wanted} members are the same run as another one of their condition, and count "
                    "with it once.")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What capability.py found, as tables and as a picture."""
+from ensemble_read import reading
 from text_table import number, quantity, scale, short, table
 
 import numpy as np
@@ -8,12 +9,11 @@ FAR_LOAD = 2  # times the largest tension: a breaking load beyond is not in the 
 
 
 def value(found, x):
-    """A value of the searched key with its unit, a ratio in %."""
+    """A value of the searched key with its unit, a concentration in %, an angle in degrees."""
     if x is None:
         return "–"
-    if found["search"] == "ice.concentration":
-        return f"{short(100 * x)} %"
-    return quantity(x, "N") if found["unit"] == "N" else f"{short(x)} {found['unit']}".strip()
+    factor, unit = reading(found["search"], found["unit"])
+    return quantity(x, "N") if unit == "N" else f"{short(factor * x)} {unit}".strip()
 
 
 def force(x):
@@ -129,15 +129,15 @@ def figure(found):
 
     import matplotlib.pyplot as plt
     colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT
-    some, percent = found["conditions"], found["search"] == "ice.concentration"
-    factor = 100.0 if percent else 1.0
+    some, (factor, read_in) = found["conditions"], reading(found["search"], found["unit"])
     across = all(c["for"] is not None for c in some) and sum(
         c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some) > 1
     fig, grid = plt.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
     width, height = fig.get_size_inches()
     fig.subplots_adjust(left=0.75 / width, right=1 - 0.2 / width, top=1 - 1.0 / height, bottom=0.95 / height,
                         wspace=0.3)
-    words = "concentration, %" if percent else f"{found['search']}, {found['unit']}".rstrip(", ")
+    of = "concentration" if found["search"] == "ice.concentration" else found["search"]
+    words = f"{of}, {read_in}".rstrip(", ")
     largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
     kilo, newton = scale(largest, "N")
     parted = any(None in p["speed"] for c in some for p in c["points"])

@@ -23,6 +23,7 @@ A tow that starts at its full speed (tow.ramp of 0) is held against one that tak
 """
 import argparse
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -263,6 +264,15 @@ def fields_row(study):
              "judged": "none" if n >= needed else "open"}]
 
 
+def verdicts(study):
+    """{verdict on the window: how many of the tows of the case as it is}."""
+    found = Counter()
+    for i in (i for i in range(FIELDS[-1]) if study.kept("case", i, {})):
+        with Run(study.path("case", i)) as run:
+            found[run.verdict[0]] += 1
+    return dict(found)
+
+
 def varied(study, kinds, margin, tries, end):
     """{name: rows}. What is left of the budget goes in equal parts to what is still open, until all is resolved or
     nothing can be run any more."""
@@ -329,7 +339,7 @@ def main(argv=None):
             with Run(study.path("case", 0)) as run:
                 values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,
-             "budget_min": a.budget, "looks": LOOKS, "spent_min": (time.monotonic() - began) / 60, "rows": rows}
+             "verdicts": verdicts(study), "budget_min": a.budget, "looks": LOOKS, "spent_min": (time.monotonic() - began) / 60, "rows": rows}
     findings.keep("converge", found, folder, a.force)
     study.tell_failed()
 

@@ -51,8 +51,18 @@ def cells(row):
             f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
 
 
+def doubtful(found):
+    """A line on windows of the case that are not those of a steady tow; "" without one."""
+    verdicts = found.get("verdicts") or {}
+    some = [f"{verdicts[kind]} {kind}" for kind in ("not steady", "too short") if verdicts.get(kind)]
+    if not some:
+        return ""
+    return (f"WARNING: of the {sum(verdicts.values())} tows of the case as it is, {' and '.join(some)}: an effect on "
+            "their mean is one on the mean of that stretch of time.\n\n")
+
+
 def text(found, markdown=False):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
     note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together. What is below "
             f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
-    return table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note
+    return doubtful(found) + table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note

@@ -24,7 +24,8 @@ import soundness
 from bergtow_read import Run, RunError, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
-MIN_INDEPENDENT = 20  # samples below which the program itself calls a window short
+# samples, and stretches of contact, below which the program itself calls a window too short
+MIN_INDEPENDENT, MIN_STRETCHES = 20, 10
 #: s at full scale, five time scales of loads.py: a tow whose line parts earlier in the window has no mean, since what
 #: comes shortly before that is the largest of all
 LEAST_TOW = 150.0
@@ -295,8 +296,7 @@ class Ensemble:
             verdict, independent = window.get("verdict"), self.number("window_n_independent", m)
             short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(
                 window.get("warning"))
-            reason = window.get("reason") or ""
-            few = verdict == "too short" and ("stretches of contact" in reason or "met no ice" in reason)
+            few = self.number("window_n_contact_stretches", m) < MIN_STRETCHES
             short = short and not few
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,

@@ -179,11 +179,18 @@ def signals(s, markdown):
                     f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return "\n".join(["No loads: no member has a window with a towed body.", *left_out(s)])
+        return "\n".join([nothing(s), *left_out(s)])
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
             "that means differ a little from those of the whole window. In the start: the largest of the means that "
             "begin before the window, which is in no other number. 95 %: interval over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *left_out(s), *conversions(s), *panel_lines(s)])
+
+
+def nothing(s):
+    """Why there is no row of any load."""
+    if any(c["loads_left_out"] for c in s["conditions"]):
+        return "No statistics of a load."
+    return "No loads: no member has a window with a towed body."
 
 
 def left_out(s):
@@ -218,7 +225,7 @@ def quantiles(s, markdown):
             return [first["label"], *("{} ({})".format(*estimate(x["quantiles"][str(q)], factor)) for q in SHOWN), unit]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return "No loads: no member has a window with a towed body."
+        return nothing(s)
     return table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, markdown) + \
         "\n\nOf the same moving mean. Brackets: 95 %, over fields."
 

@@ -37,6 +37,8 @@ def may_be_null(path, case, summary):
         (r".*_low_n|.*_high_n", window < 2),
         (r".*_force_n|.*_ice_resistance.*_n|budget\..*|window\..*|reference\.ratio", window == 0),
         (r".*_se_n|sd_.*|window\.n_independent|window\.correlation_time_s", window < 3 or not body),
+        (r"window\.n_contact_stretches", not body or window < 20
+         or not (summary["sd_ice_resistance_n"] or 0) > 0.02 * abs(summary["mean_ice_resistance_n"] or 0)),
         (r"budget\..*relative", True),  # over the largest force, which may be 0
         (r"reference\.ratio", not body or reference == 0),
         (r"domain", not body),

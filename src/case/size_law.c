@@ -3,12 +3,21 @@
 #include "case/size_law.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "base/elementary.h"
 
 #define LEAST_SHARE 1e-3 // of a law that its limits leave
 
 static double normal_cdf(double x) { return 0.5 * bt_erfc(-x / sqrt(2)); }
+
+/// Limits of a law that has one at least, for a message.
+static const char *cut_at(const bt_sizes *s, char out[64])
+{
+    if (s->min > 0 && s->max > 0) snprintf(out, 64, "%g..%g m", s->min, s->max);
+    else snprintf(out, 64, "%g m", s->min > 0 ? s->min : s->max);
+    return out;
+}
 
 // E[d^k; low < d < high] / P(low < d < high) of the lognormal law: completing the square shifts the limits by kσ.
 static double lognormal_moment(const bt_sizes *s, double mu, int k)
@@ -97,8 +106,8 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
     if (s->min <= 0 && s->max <= 0) return BT_OK;
     if ((s->min > 0 && s->mean <= s->min) || (s->max > 0 && s->mean >= s->max)) {
         bt_errors_add(
-            err, "%s: ice.size: %g m is not between ice.size_min %g m and ice.size_max %g m; move the limits apart",
-            path, s->mean, s->min, s->max);
+            err, "%s: ice.size: %g m is %s; move the limits apart", path, s->mean,
+            s->min > 0 && s->mean <= s->min ? "not above ice.size_min" : "not below ice.size_max");
         return BT_ERR_CASE;
     }
     double low = s->mu - 3 * s->sigma, high = s->mu + 3 * s->sigma;
@@ -112,9 +121,8 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
                          normal_cdf(s->min > 0 ? (bt_log(s->min) - s->mu) / s->sigma : -INFINITY);
     if (!(fabs(mean - s->mean) < 1e-6 * s->mean) || !(share > LEAST_SHARE)) {
         bt_errors_add(
-            err,
-            "%s: ice.size: no lognormal law cut at %g..%g m has the mean %g m and spread %g; move the limits apart",
-            path, s->min, s->max, s->mean, s->spread);
+            err, "%s: ice.size: no lognormal law cut at %s has the mean %g m and spread %g; move the limits apart",
+            path, cut_at(s, (char[64]){0}), s->mean, s->spread);
         return BT_ERR_CASE;
     }
     return BT_OK;

@@ -408,6 +408,7 @@ static void judge_contact(bt_steady *s, const bt_run_totals *t)
 {
     const bt_mean *ice = &s->series[BT_REPORTED_ICE].mean;
     s->met_no_ice = t->concentration > 0 && ice->mean == 0 && ice->sd == 0;
+    if (s->met_no_ice) s->stretches = 0;
     if (s->met_no_ice && t->lead.mode == BT_LEAD_CHANNEL)
         decide(s, BT_TOO_SHORT,
                "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it that "

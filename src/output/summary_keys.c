@@ -60,6 +60,10 @@ static const char *reason(const view *v)
 }
 static const char *rule(const view *v) { return !v->s->body ? NULL : v->s->window.given ? "given" : "mser5"; }
 static double n_independent(const view *v) { return number_or_nan(v->s->window.n, v->s->ice.n_eff); }
+static double n_stretches(const view *v)
+{
+    return number_or_nan(v->s->window.n && isfinite(v->s->window.stretches), v->s->window.stretches);
+}
 static double unconverged_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.unconverged); }
 static double window_residual(const view *v) { return number_or_nan(v->s->window.n, v->s->window.residual); }
 static double peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, false); }
@@ -296,6 +300,8 @@ static const bt_json_key rows[] = {
     OF_SUMMARY("window.end_s", window.end, "s", "end of its last step"),
     OF_SUMMARY("window.n_samples", window.n, "1", "steps in the window"),
     NUMBER("window.n_independent", n_independent, "1", "independent samples of the ice resistance among them"),
+    NUMBER("window.n_contact_stretches", n_stretches, "1",
+        "equal stretches of contact with ice that the mean is worth; null where its resistance hardly varies"),
     OF_SUMMARY("window.correlation_time_s", window.correlation_time, "s", "correlation time of the ice resistance"),
     NUMBER("window.unconverged_share", unconverged_share, "1",
         "share of the steps in the window that did not converge"),

@@ -214,11 +214,11 @@ def test_the_file_that_is_named_is_read(tmp_path):
 # ---- studies with gaps
 
 
-def with_status(folder, status, n=20):
+def with_status(folder, status, n=20, **more):
     """A hypercube of n conditions and two fields, whose member of condition c and repeat r has status(c, r)."""
     rng = np.random.default_rng(8)
     members = [made_up.member(np.full(3, 100.0 + 5 * c + rng.normal()), {"ice.friction": (c + 0.5) / n}, c,
-                              status=status(c, r), reason="it diverged" if status(c, r) == made_up.FAILED else "")
+                              status=status(c, r), reason="it diverged" if status(c, r) == made_up.FAILED else "", **(more if c == 3 else {}))
                for c in range(n) for r in range(2)]
     return made_up.write(folder, members, sampling="latin-hypercube")
 
@@ -233,6 +233,14 @@ def test_a_study_that_is_cut_short_is_taken_as_far_as_it_is_a_fair_sample(tmp_pa
     assert said.startswith("WARNING: 9 of 40 members are still to come") and "beyond the first gap 1 are done" in said
     with pytest.raises(RunError, match="too few members for a budget: 0 conditions, needs 8"):
         budget.of_ensemble(Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
+
+
+def test_tows_with_doubts_are_counted(tmp_path):
+    found = budget.of_ensemble(Ensemble(with_status(tmp_path / "a", lambda c, r: made_up.FINISHED,
+                                                    window={"n_contact_stretches": 2.0})))
+    assert found["doubts"] == {"few": 2}
+    said = budget_text.text(plain(found | {"numerics": None}))
+    assert "WARNING: 2 of 40 tows carry warnings and are in the numbers (2 few;" in said
 
 
 def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):

@@ -312,6 +312,12 @@ def test_the_bollard_pull_that_open_water_asks_for(tmp_path):
     assert "N" in text.splitlines()[2]
 
 
+@pytest.mark.parametrize("key, unit, words", [("tow.direction", "rad", "30.0 deg"), ("ice.concentration", "", "52.4 %"),
+                                              ("ice.size", "m", "0.524 m"), ("tow.vessel.bollard_pull", "N", "0.524 N")])
+def test_a_value_reads_as_users_write_it(key, unit, words):
+    assert capability_text.value({"search": key, "unit": unit}, 0.5236) == words
+
+
 @pytest.mark.slow
 def test_a_line_that_parts_is_no_tow(tmp_path):
     case = changed(THRUST, tow__mode="line", tow__line__breaking_load=9, run__duration=20)

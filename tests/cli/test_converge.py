@@ -58,6 +58,12 @@ def test_verdicts():
     assert converge.names_of("width, dt") == ["width", "dt"]
 
 
+def test_windows_that_are_not_steady_are_counted():
+    said = converge_text.doubtful({"verdicts": {"steady": 5, "too short": 2, "not steady": 1}})
+    assert said.startswith("WARNING: of the 8 tows of the case as it is, 1 not steady and 2 too short: ")
+    assert converge_text.doubtful({"verdicts": {"steady": 5}}) == converge_text.doubtful({}) == ""
+
+
 def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
     """What comes after the line parted is no resistance to a tow."""
     def run(adrift):
@@ -157,6 +163,8 @@ def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp
     loose = changed(CASE, ice__concentration=0.2, run__duration=20, output__window_start=5)
     found, text = converged(tmp_path, loose, "--vary", "tolerance,fields", "--budget", 3)
     first, second = found["rows"]
+    steady, tows = found["verdicts"].get("steady", 0), sum(found["verdicts"].values())
+    assert tows >= 4 and (f"WARNING: of the {tows} tows of the case as it is" in text) == (steady < tows)
     assert first["judged"] == "none" and first["same_ice"] and "0.001 will do" in text
     assert found["values"]["ice.concentration"] == "0.2"  # of which case it speaks, for other studies
     assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text

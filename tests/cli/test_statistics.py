@@ -261,6 +261,17 @@ def test_a_run_that_is_there_twice_counts_once(tmp_path):
     assert "2 members ended in the very state of another one" in result.stdout and "6 of 8 members" in result.stdout
 
 
+def test_a_member_that_met_little_ice_is_known_without_its_folder(tmp_path):
+    """Red when it is told by the words of its verdict: without these it is short, and its small mean can be left out.
+    """
+    made = [made_up.member(np.ones(50) + k, {}, 0, window={"n_independent": 3.0} | more)
+            for k, more in enumerate(({"n_contact_stretches": 2.5}, {"n_contact_stretches": 12.0}, {}))]
+    folder = made_up.write(tmp_path / "all", made)
+    for there in (True, False):
+        assert [Ensemble(folder).doubts(m) for m in range(3)] == [{"few"}, {"short"}, {"short"}], there
+        shutil.rmtree(folder / "members", ignore_errors=True)
+
+
 def test_members_of_two_builds_are_reported(tmp_path):
     folder = made_up.write(tmp_path / "all", [made_up.member(np.ones(50) + k, {}, 0) for k in range(3)])
     with h5py.File(folder / "members/c001-r001/result.h5", "a") as f:

@@ -355,6 +355,7 @@ static void a_body_that_met_no_ice_tells_nothing(void **state)
         char *json = summary_of(&c, 600, &t, FLOES, never_touched);
         assert_true(!strstr(json, "the body met no ice within the window") == !ice);
         if (ice) assert_string_equal(json_value(json, "verdict"), "\"too short\"");
+        assert_string_equal(json_value(json, "n_contact_stretches"), ice ? "0" : "null");
         if (ice) assert_null(strstr(json, "\"simulated_over_estimate\": 0"));
         free(json);
     }
@@ -376,6 +377,7 @@ static void a_few_collisions_are_few_samples(void **state)
         assert_true((strstr(json, "is made of a few stretches of contact, worth 4 equal ones") == NULL) == (k > 0));
         assert_string_equal(json_value(json, "verdict"), k ? "\"steady\"" : "\"too short\"");
         assert_true(fabs(atof(json_value(json, "n_independent")) - (k ? 40 : 4)) <= 1);
+        assert_true(fabs(atof(json_value(json, "n_contact_stretches")) - (k ? 40 : 4)) <= 1);
         free(json);
     }
 }
