@@ -43,9 +43,9 @@ PHASE_SHARE = "PHASE_share"  # in the place of a column for each phase of the su
 COLUMNS = [
     "scene", "asked", "floes", "ranks", "threads", "runs", "steps", "dt_s", "wall_s", "wall_min_s", "wall_max_s",
     "ns_per_floe_step",
-    PHASE_SHARE, "mean_sweeps", "contacts", "contact_sweeps_per_s", "speedup", "efficiency", "weak_efficiency",
-    "weak_solve_efficiency", "imbalance", "edge_cut", "halo_share", "bytes_per_floe", "sweep_gb_s", "triad_gb_s",
-    "sweep_of_triad", "unconverged", "state_hash"
+    PHASE_SHARE, "mean_sweeps", "contacts", "contact_sweeps_per_s", "speedup", "step_speedup", "efficiency",
+    "weak_efficiency", "weak_solve_efficiency", "imbalance", "edge_cut", "halo_share", "bytes_per_floe", "sweep_gb_s",
+    "triad_gb_s", "sweep_of_triad", "unconverged", "state_hash"
 ]
 #: passed on from summary.json where it has them
 FROM_SUMMARY = {
@@ -137,6 +137,7 @@ def record(scene, n, s, contact_sweeps, peak_memory):
         "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
         "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None
     }
+    r["step"] = sum(t for name, t in r["phases"].items() if name != "output") / max(1, r["floes"] * r["steps"])
     r.update({name: s.get(key) for name, key in FROM_SUMMARY.items()})
     if r["memory"] is None and peak_memory:
         r["memory"] = peak_memory / s["n_floes"]
@@ -231,6 +232,7 @@ def tables(records, triads):
         groups.setdefault((r["scene"], r["asked"], r["ranks"], r["threads"]), []).append(r)
     ns = {key: median([r["ns"] for r in runs]) for key, runs in groups.items()}
     rate = {key: median([r["rate"] for r in runs]) for key, runs in groups.items()}
+    step = {key: median([r["step"] for r in runs]) for key, runs in groups.items()}
     rows = []
     for (scene, n, ranks, threads), runs in groups.items():
         first, cores, mid = runs[0], ranks * threads, lambda name: median([r[name] for r in runs])  # noqa: B023
@@ -247,6 +249,7 @@ def tables(records, triads):
         })
         row["speedup"] = ratio(ns.get((scene, n, 1, 1)), own)
         row["efficiency"] = ratio(row["speedup"], cores)
+        row["step_speedup"] = ratio(step.get((scene, n, 1, 1)), step[scene, n, ranks, threads])
         part = (scene, n // cores, 1, 1) if cores > 1 and n % cores == 0 else None  # one core's share, alone
         row["weak_efficiency"] = ratio(ns.get(part), cores * own)
         row["weak_solve_efficiency"] = ratio(rate[scene, n, ranks, threads], cores * (rate.get(part) or 0))
@@ -357,7 +360,7 @@ def measure(o, with_ranks):
             for row in tables(group, triads):
                 say(f"{scene:15s} {row['floes']:7d} floes {row['ranks']}x{row['threads']}  "
                     f"{row['ns_per_floe_step']:9.0f} ns a floe and step  "
-                    f"speed-up {row['speedup']:.2f}  sweeps {row['mean_sweeps']:6.1f}  contacts {row['contacts']:.0f}")
+                    f"speed-up {row['speedup']:.2f}, of the steps {row['step_speedup']:.2f}  sweeps {row['mean_sweeps']:6.1f}  contacts {row['contacts']:.0f}")
             write_csv(o.out / "bench.csv", tables(records, triads))  # what there is, should the rest be interrupted
     return records, triads
 

@@ -99,7 +99,7 @@ def test_fields_are_made_once_and_keys_reach_the_run(small):
 
 def made_up(n, ranks, threads, wall, sweep_bytes=None, **other):
     """A record of 10 steps with 1000 contacts in 4 sweeps each, half of the time in the phase solve."""
-    phases = {"detect": 0.0, "solve": wall / 2}
+    phases = {"detect": 0.0, "solve": wall / 2, "output": 0.1}
     s = {
         "n_floes": n, "ranks": ranks, "threads": threads, "n_steps": 10, "dt_s": 1, "wall_time_s": wall,
         "ns_per_floe_step": 1e9 * wall / n / 10, "phases_s": phases, "mean_sweeps": 4, "contacts_mean": 1000,
@@ -118,6 +118,7 @@ def test_figures_of_known_runs():
     assert (one["runs"], one["wall_s"], one["wall_min_s"], one["wall_max_s"]) == (3, 2.0, 1.0, 9.0)
     assert (one["speedup"], one["efficiency"], one["weak_efficiency"]) == (1, 1, None)
     assert (two["speedup"], two["efficiency"], two["weak_efficiency"]) == (1.6, 0.8, None)
+    assert (one["step_speedup"], two["step_speedup"], ranks["step_speedup"]) == (1, 1.6, 2)  # without output
     assert (large["speedup"], large["weak_efficiency"]) == (1, None)
     # 2,000 floes on two cores in 2.5 s against 1,000 on one in 2 s
     assert (ranks["speedup"], ranks["efficiency"], ranks["weak_efficiency"]) == (2, 1, pytest.approx(0.8))
