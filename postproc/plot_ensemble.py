@@ -87,24 +87,46 @@ def spread(x, n, half, log):
     return x * np.exp(at) if log else x + at
 
 
+#: how a member is drawn: its mark, and what it means
+MARKS = {
+    "sound": ({"marker": "o", "markersize": 3.6, "markeredgewidth": 0, "color": style.ICE, "alpha": 0.35}, "{}"),
+    "doubtful": ({"marker": "o", "markersize": 4.2, "markeredgewidth": 0.9, "color": style.ICE, "alpha": 0.6,
+                  "markerfacecolor": "none"}, "{} in doubt: not steady, too short, unconverged or stopped"),
+    "jammed": ({"marker": "x", "markersize": 5, "markeredgewidth": 1.2, "color": style.JAM},
+               "{} where the body stood still"),
+}
+
+
+def mark_of(e, m):
+    """Key of MARKS. A warning of another kind is no doubt about a mean."""
+    doubts = e.doubts(m)
+    return "jammed" if "jammed" in doubts else "doubtful" if doubts - {"other"} else "sound"
+
+
+def draw_members(axes, e, rows, x, y):
+    marks = np.array([mark_of(e, m) for m in rows])
+    for kind, (mark, _) in MARKS.items():
+        some = marks == kind
+        if some.any():
+            axes.plot(x[some], y[some], linestyle="none", zorder=3.5 if kind == "jammed" else 3, **mark)
+
+
+def members_legend(e, word):
+    """Handles and labels of draw_members."""
+    there = {"sound"} | {mark_of(e, m) for m in e.used}
+    return [(plt.Line2D([], [], linestyle="none", **mark), words.format(word))
+            for kind, (mark, words) in MARKS.items() if kind in there]
+
+
 def draw_fields(axes, e, some, key, factor, log_x):
-    """Dots of members, the mean with its 95 % interval and band, the median, and crosses for jams."""
+    """Members, the mean with its 95 % interval and band, and the median."""
     x = np.array([c.values[key] for c in some])
     half = width_of(x, log_x)
     means = [of(e, c.finished) for c in some]
     band = np.array([stat_mean.t_interval(y) for y in means])
     for c, y in zip(some, means):
         at, order = spread(c.values[key], len(y), half, log_x), np.argsort(y)
-        jam = np.array(["jammed" in e.doubts(m) for m in c.finished])[order]
-        axes.plot(at[~jam],
-                  y[order][~jam] / factor,
-                  "o",
-                  color=style.ICE,
-                  alpha=0.35,
-                  markersize=3.6,
-                  markeredgewidth=0,
-                  zorder=3)
-        axes.plot(at[jam], y[order][jam] / factor, "x", color=style.JAM, markersize=5, markeredgewidth=1.2, zorder=3.5)
+        draw_members(axes, e, c.finished[order], at, y[order] / factor)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
         axes.fill_between(x,
@@ -134,21 +156,13 @@ def draw_fields(axes, e, some, key, factor, log_x):
               zorder=6)
 
 
-def fields_legend(jams):
+def fields_legend(e):
     """Handles and labels of draw_fields."""
     line = plt.Line2D
-    out = [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"),
-           (line([], [], marker="o", color=style.ICE, alpha=0.35, linestyle="none", markersize=4), "a field"),
-           (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
-                 markeredgewidth=2), "median of the fields")]
-    if jams:
-        out.append((line([], [], marker="x", color=style.JAM, linestyle="none",
-                         markersize=5), "a field where the body stood still"))
-    return out
-
-
-def jammed(e):
-    return any("jammed" in e.doubts(m) for m in e.used)
+    field, *others = members_legend(e, "a field")
+    return [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), field,
+            (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
+                  markeredgewidth=2), "median of the fields"), *others]
 
 
 def force_limits(e, some_groups, log):
@@ -287,7 +301,7 @@ def draw_sweep(e, key):
         if k + columns >= len(shown):
             axes.set_xlabel(axis_label(e, key))
             axes.tick_params(labelbottom=True)
-    pairs = fields_legend(jammed(e)) + [(handle, label) for label, handle in extra.items()]
+    pairs = fields_legend(e) + [(handle, label) for label, handle in extra.items()]
     note = " ".join(
         ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
         (["Estimates at the speed made good, dotted outside the range they are meant for."]
@@ -323,17 +337,7 @@ def draw_scatter(e, key):
     factor, unit = style.scale([np.median(y)], "N")
     figure, axes = plt.subplots(figsize=(9.5, 5.8))
     figure.subplots_adjust(left=0.09, right=0.98, top=0.85, bottom=0.12)
-    jam = np.array(["jammed" in e.doubts(m) for m in rows])
-    axes.plot(x[~jam],
-              y[~jam] / factor,
-              "o",
-              color=style.ICE,
-              alpha=0.45,
-              markersize=4,
-              markeredgewidth=0,
-              label="a member")
-    if jam.any():
-        axes.plot(x[jam], y[jam] / factor, "x", color=style.JAM, markersize=5, label="a member whose body stood still")
+    draw_members(axes, e, rows, x, y / factor)
     drawn, means, _ = sample(e, dict(zip(rows.tolist(), y)))
     at = drawn[key]
     bins = np.array_split(np.argsort(at), min(8, len(at) // 8)) if len(at) >= 24 else []
@@ -362,7 +366,8 @@ def draw_scatter(e, key):
     axes.set_xlabel(axis_label(e, key))
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(True)
-    axes.legend(loc="best")
+    pairs = members_legend(e, "a member") + list(zip(*axes.get_legend_handles_labels()))
+    axes.legend([handle for handle, _ in pairs], [label for _, label in pairs], loc="best")
     headline(figure, e, f"resistance against {short_key(key)}")
     return figure
 

@@ -409,8 +409,11 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
     jams = np.concatenate([line.get_ydata() for line in panel.lines if line.get_marker() == "x"])
     expected = np.concatenate([1000 * a * 0.01 * (1 + 0.1 * (np.arange(8) - 3.5)) for a in (0.2, 0.5)])
     assert sorted(shown) == pytest.approx(sorted(expected)) and list(jams) == pytest.approx([2 * 1.35])
+    rings = np.concatenate([line.get_ydata() for line in panel.lines if line.get_markerfacecolor() == "none"])
+    assert sorted(rings) == pytest.approx([2 * 0.65, 2 * 0.75])  # those that did not converge
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
     assert "Lichey-Hellmer" in labels and "dilute limit" in labels and "a field where the body stood still" in labels
+    assert any(label.startswith("a field in doubt") for label in labels)
     matplotlib.pyplot.close("all")
 
 
