@@ -339,7 +339,8 @@ def main(argv=None):
             with Run(study.path("case", 0)) as run:
                 values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,
-             "verdicts": verdicts(study), "budget_min": a.budget, "looks": LOOKS, "spent_min": (time.monotonic() - began) / 60, "rows": rows}
+             "verdicts": verdicts(study), "budget_min": a.budget, "looks": LOOKS,
+             "spent_min": (time.monotonic() - began) / 60, "rows": rows}
     findings.keep("converge", found, folder, a.force)
     study.tell_failed()
 

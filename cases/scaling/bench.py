@@ -360,7 +360,8 @@ def measure(o, with_ranks):
             for row in tables(group, triads):
                 say(f"{scene:15s} {row['floes']:7d} floes {row['ranks']}x{row['threads']}  "
                     f"{row['ns_per_floe_step']:9.0f} ns a floe and step  "
-                    f"speed-up {row['speedup']:.2f}, of the steps {row['step_speedup']:.2f}  sweeps {row['mean_sweeps']:6.1f}  contacts {row['contacts']:.0f}")
+                    f"speed-up {row['speedup']:.2f}, of the steps {row['step_speedup']:.2f}  "
+                    f"sweeps {row['mean_sweeps']:6.1f}  contacts {row['contacts']:.0f}")
             write_csv(o.out / "bench.csv", tables(records, triads))  # what there is, should the rest be interrupted
     return records, triads
 

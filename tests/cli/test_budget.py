@@ -218,7 +218,8 @@ def with_status(folder, status, n=20, **more):
     """A hypercube of n conditions and two fields, whose member of condition c and repeat r has status(c, r)."""
     rng = np.random.default_rng(8)
     members = [made_up.member(np.full(3, 100.0 + 5 * c + rng.normal()), {"ice.friction": (c + 0.5) / n}, c,
-                              status=status(c, r), reason="it diverged" if status(c, r) == made_up.FAILED else "", **(more if c == 3 else {}))
+                              status=status(c, r), reason="it diverged" if status(c, r) == made_up.FAILED else "",
+                              **(more if c == 3 else {}))
                for c in range(n) for r in range(2)]
     return made_up.write(folder, members, sampling="latin-hypercube")
 

@@ -313,7 +313,7 @@ def test_the_bollard_pull_that_open_water_asks_for(tmp_path):
 
 
 @pytest.mark.parametrize("key, unit, words", [("tow.direction", "rad", "30.0 deg"), ("ice.concentration", "", "52.4 %"),
-                                              ("ice.size", "m", "0.524 m"), ("tow.vessel.bollard_pull", "N", "0.524 N")])
+                                              ("ice.size", "m", "0.524 m"), ("tow.line.breaking_load", "N", "0.524 N")])
 def test_a_value_reads_as_users_write_it(key, unit, words):
     assert capability_text.value({"search": key, "unit": unit}, 0.5236) == words
 
