@@ -24,6 +24,7 @@ import loads  # noqa: E402
 import loads_text  # noqa: E402
 import report_method  # noqa: E402
 import plot_ensemble  # noqa: E402
+import plot_loads  # noqa: E402
 import stat_alike  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
@@ -799,7 +800,7 @@ def test_the_picture_of_return_levels(statement):
     dots = next(line for line in axes.lines if line.get_marker() == ".")
     assert dots.get_ydata()[0] * 1e6 == pytest.approx(f["maxima"][0])
     level = f["levels"][0]
-    assert plot_ensemble.tail(f, np.array([level["hours"]]))[0] == pytest.approx(level["level"])
+    assert plot_loads.tail(f, np.array([level["hours"]]))[0] == pytest.approx(level["level"])
     # where a tow is shorter than clusters are apart
     for c in s["conditions"]:
         c["loads"]["tow_force"]["design"] = {"refused": "no level", "return_hours": 0.01, "tow_hours": 0.001}

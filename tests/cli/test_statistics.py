@@ -21,6 +21,7 @@ from test_postproc import done, pixels
 import ensemble  # noqa: E402  (test_postproc has put postproc/ on the path)
 import plot_chains  # noqa: E402
 import plot_ensemble  # noqa: E402
+import plot_sweep  # noqa: E402
 import soundness  # noqa: E402
 import stat_mean  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
@@ -391,9 +392,9 @@ def test_members_without_a_folder_are_reported(tmp_path, capsys):
 
 def test_the_law_of_the_speed_is_found(plain):
     e = Ensemble(plain[0])
-    for words, some in plot_ensemble.groups(e, "tow.speed"):
-        exponent, low, high, _ = plot_ensemble.power_law([c.values["tow.speed"] for c in some],
-                                                         [plot_ensemble.of(e, c.finished) for c in some])
+    for words, some in plot_sweep.groups(e, "tow.speed"):
+        exponent, low, high, _ = plot_sweep.power_law([c.values["tow.speed"] for c in some],
+                                                      [plot_ensemble.of(e, c.finished) for c in some])
         assert exponent == pytest.approx(2, abs=0.1) and low < 2 < high and words.startswith("concentration")
     figure = plot_ensemble.draw_sweep(e, "tow.speed")
     law = next(line for line in figure.axes[0].lines if line.get_color() == plot_ensemble.style.TOW)
