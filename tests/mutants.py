@@ -100,7 +100,7 @@ MUTANTS = {
         ("if (s->spread < CUT_MATTERS) return;", "return;", "small floes that are drawn again move the mean"),
         ("return whole * gamma_above(shape + k, x)", "return whole * gamma_above(shape, x)", "moments of what is left"),
     ]),
-    "src/case/track.c": (["cli/test_verdict.py::test_a_body_that_leaves_the_ice_is_no_steady_tow"], [
+    "src/case/track.c": (["cli/test_verdict.py::test_a_gap_of_a_field_file_is_seen"], [
         ("if (wraps && !filled) period[k] = extent[k];", "", "ice that does not fill a moving window"),
     ]),
     "src/base/stats.c": (["unit/test_stats"], [
@@ -630,6 +630,7 @@ MUTANTS = {
         ("if (start > earliest && collisions) {", "if (false) {", "a window that begins after a collision"),
         ("s->stretches = varies(ice) ? contacts(x, ice) : INFINITY;", "s->stretches = INFINITY;",
          "three collisions are steady"),
+        ("if (s->met_no_ice) s->stretches = 0;", "", "a body that met no ice has met enough"),
         ("const double base = sorted[n / 10];", "const double base = 0 * sorted[n / 10];", "a floe that is carried"),
         ("if (length < swings * (1 - 1e-9))", "if (false)", "a window without a swing"),
         ("|| !(m->sd <= BT_STEADY_MATERIAL * fabs(m->mean));", "|| !(m->sd <= 0);",
