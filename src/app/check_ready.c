@@ -145,5 +145,7 @@ void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, b
     bt_outline_warn(&f->outlines, c, warnings);
     const double area = f->n > 0 ? bt_field_floe_area(f) : bt_case_made_area(c);
     bt_ice_warn_closed(c, area + bt_case_area_by_hand(c), warnings);
-    if (n->count >= 1) bt_ice_warn(c, n->size, n->thickness, warnings);
+    if (n->count < 1) return;
+    bt_ice_warn(c, n->size, n->thickness, warnings);
+    bt_ice_warn_slow(c, n->size, warnings);
 }

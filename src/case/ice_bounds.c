@@ -161,6 +161,24 @@ void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings)
                   c->domain.ends_closing > 0 ? "ends" : "sides", closed, c->estimate.phi_j);
 }
 
+void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings)
+{
+    const double accepted = c->solver.tolerance * bt_case_reference_speed(c);
+    for (int k = 0; k < 2; k++) {
+        const double closing = k ? c->domain.sides_closing : c->domain.ends_closing,
+                     across = (k ? c->domain.width : c->domain.length) / size;
+        // of a row of floes from wall to wall each contact takes an equal share, where they are locked
+        const double share = 2 * closing / (across + 1);
+        if (!(closing > 0 && size > 0 && share < 2 * accepted)) continue;
+        bt_errors_add(warnings,
+                      "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, is %.2g "
+                      "m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls may bear "
+                      "no load, without a word; set solver.tolerance: %.1g",
+                      k ? "sides" : "ends", closing, across, share, accepted,
+                      c->solver.tolerance * 0.1 * share / accepted);
+    }
+}
+
 static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice is seldom so thick, assumed
 
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings)

@@ -48,6 +48,10 @@ double bt_ice_closed(const bt_case *c, double area);
 /// Warn of walls that pack it (estimate.phi_j).
 void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings);
 
+/// Warn of walls that close so slowly that floes of this mean size, m, which share it out among themselves, take it for
+/// rest: a contact may close by the tolerance of the solver.
+void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings);
+
 /// Warn of a mean thickness that looks like one in centimetres. size, thickness: of the mean floe, m.
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings);
 

@@ -150,6 +150,11 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
                       "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
                       BT_LOCKED_REMEDY,
                       h->locked_steps, (long long)h->n);
+    if (h->unprojected > 0)
+        bt_errors_add(&s->warnings,
+                      "in %lld of %lld steps the position projection met its limit of work and left overlap: bodies are "
+                      "pressed where there is no room, slower than the tolerance tells; lower solver.tolerance, or %s",
+                      (long long)h->unprojected, (long long)h->n, BT_LOCKED_REMEDY);
     if (h->outrun)
         bt_errors_add(
             &s->warnings,
@@ -326,6 +331,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     bt_case_warn_tables(c, &s->warnings);
     bt_case_warn_body(c, &s->warnings);
     bt_ice_warn_closed(c, t->ice_area, &s->warnings);
+    if (n_floes > 0) bt_ice_warn_slow(c, t->mean_size, &s->warnings);
     if (t->undisturbed) bt_case_warn_lead(c, t->undisturbed->drift_x, t->undisturbed->drift_y, &s->warnings);
     warn_of_solver(s, h, c, t);
     warn_of_bodies(s, h, c, t);

@@ -127,8 +127,13 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
             } else {
                 map = bt_larger(zero, r.ln[c] - w * m.mn[c]);
             }
-            const bt_vec e = bt_only(there, (map - r.ln[c]) * m.w[c]);
-            worst = bt_larger(worst, bt_size_of(e));
+            const bt_vec more = map - r.ln[c];
+            bt_vec e = bt_only(there, bt_size_of(more * m.w[c]));
+            if (bounded) { // bt_short_residual
+                const bt_vec lacks = bt_smaller(-w, (more / map) * (p->tolerance / BT_SHORT));
+                e = bt_larger(e, bt_only(there & (more > zero), lacks));
+            }
+            worst = bt_larger(worst, e);
             square[c] = e * e;
             total += bt_only(there, r.ln[c]);
             on |= there & ~(w >= zero);
@@ -146,7 +151,7 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
             bool listed = p->plain || on[l] || moved[i + l];
             if (bounded && u[l]->n == 0) {
                 const bt_mass own = bt_mass_of(u[l], inv);
-                const double largest = bt_sheets_residual(u[l], &own, k[l], v, &f.squares);
+                const double largest = bt_sheets_residual(u[l], &own, k[l], v, p->tolerance, &f.squares);
                 listed = p->plain || u[l]->ln[0] + u[l]->ln[1] > 0 || u[l]->lt != 0 || moved[i + l] || largest > 0;
                 f.most = bt_max(f.most, largest);
                 f.bad += largest > near;

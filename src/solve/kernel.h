@@ -100,27 +100,47 @@ static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const 
     return k ? bt_limit_point(k, u, m, i, w - m->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * m->mn[i]);
 }
 
-static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
-                                        double *sum)
+#define BT_SHORT 0.01 // part of its bound by which an impulse may be short of it, assumed
+
+/// Residual of a row under a bound that is `part` of its impulse short of what its map says, m/s, `closing`: the speed
+/// that it leaves. The natural map is at most bound × W there, whatever the speed. Where that is below the tolerance
+/// (a short step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position
+/// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts.
+static inline double bt_short_residual(double closing, double part, double tolerance)
 {
-    double x, y;
-    bt_sheets_map(u, m, k, &v[u->a], &v[u->b], &x, &y);
-    x = (x - u->ln[0]) * m->wt, y = (y - u->lt) * m->wt;
-    *sum += x * x + y * y;
-    return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
+    return bt_min(closing, part * (tolerance / BT_SHORT));
 }
 
-/// Natural-map residual of a contact, m/s; into *sum the squares over its rows (a normal one a point, one tangential;
-/// two of sheets).
-static inline double bt_contact_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
-                                         double *sum)
+static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
+                                        double tolerance, double *sum)
 {
-    if (k && u->n == 0) return bt_sheets_residual(u, m, k, v, sum);
+    const bt_vel *va = &v[u->a], *vb = &v[u->b];
+    double x, y;
+    bt_sheets_map(u, m, k, va, vb, &x, &y);
+    const double size = sqrt(x * x + y * y), dx = x - u->ln[0], dy = y - u->lt;
+    const double slip = bt_max(fabs(bt_normal_velocity(u, 0, va, vb)), fabs(bt_tangent_velocity(u, va, vb)));
+    x = dx * m->wt, y = dy * m->wt;
+    const double lacks = size > 0 ? bt_short_residual(slip, sqrt(dx * dx + dy * dy) / size, tolerance) : 0;
+    *sum += bt_max(x * x + y * y, lacks * lacks);
+    return isfinite(x + y) ? bt_max(bt_max(fabs(x), fabs(y)), lacks) : INFINITY;
+}
+
+/// Natural-map residual of a contact, m/s, and of rows under bounds what they are short of them; into *sum the squares
+/// over its rows (a normal one a point, one tangential; two of sheets). tolerance: of the problem, m/s.
+static inline double bt_contact_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
+                                         double tolerance, double *sum)
+{
+    if (k && u->n == 0) return bt_sheets_residual(u, m, k, v, tolerance, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double worst = 0, total = 0;
     for (int i = 0; i < u->n; i++) {
-        const double r = (bt_normal_map(u, m, k, i, va, vb) - u->ln[i]) * m->w[i];
-        worst = bt_max(worst, fabs(r));
+        const double map = bt_normal_map(u, m, k, i, va, vb), more = map - u->ln[i];
+        double r = fabs(more * m->w[i]);
+        if (k && more > 0) {
+            const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
+            r = bt_max(r, bt_short_residual(-w, more / map, tolerance));
+        }
+        worst = bt_max(worst, r);
         *sum += r * r;
         total += u->ln[i];
     }

@@ -17,8 +17,10 @@
 //
 // with |U' − U| the larger of the change of speed and r times that of the spin, r the radius of the body. Where A/P is
 // far beyond any speed of the step, nothing can give way but in ways no ice takes. With P = 0 this is the lemma of
-// Farkas. Rigid floes that are held by friction alone are not found: they have a solution (Acary, Cadoux, Lemaréchal &
-// Malick 2011), however large.
+// Farkas. Rigid floes that are held by friction alone are not found. They have a solution, however large, where some
+// velocities part every contact by μ times their slip at least (Acary, Cadoux, Lemaréchal & Malick 2011). Where none
+// do, there may be none, as of a wedge below its angle of friction between bodies that are led: that counts as a step
+// that did not converge.
 #ifndef BERGTOW_LOCKED_H
 #define BERGTOW_LOCKED_H
 

@@ -120,8 +120,8 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
         const bt_contact *u = &cell->contacts[i];
         const bt_mass *m = &cell->work.in_place[i].mass;
         const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        const double r =
-            limit ? bt_contact_residual(u, m, limit, v, &f.squares) : bt_contact_residual(u, m, NULL, v, &f.squares);
+        const double r = limit ? bt_contact_residual(u, m, limit, v, p->tolerance, &f.squares)
+                               : bt_contact_residual(u, m, NULL, v, p->tolerance, &f.squares);
         f.most = bt_max(f.most, r);
         f.bad += r > near;
         f.rows += u->n + 1 + (u->n == 0);

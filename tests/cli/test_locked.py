@@ -48,6 +48,22 @@ SCENES = {
 }
 
 
+def test_a_lock_below_the_tolerance_is_not_silent(tmp_path):
+    """Walls close by 0.4 mm/s on a full row of 18 squares: a contact by 0.04 mm/s, which passes for rest. Red without a
+    word. With the tolerance that is asked for the steps are locked."""
+    case = changed(TOWED, run__duration=120, domain__width=18, domain__sides_closing=4e-4, body={"shape": "none"},
+                   tow={"mode": "none"}, output=None, ice__concentration=0, floes=[
+                       {"shape": "rectangle", "length": A, "width": A, "x": 6, "y": k - 8.5, "thickness": 0.3}
+                       for k in range(18)], solver={"reference_speed": 0.5})
+    r = run(tmp_path, case, name="a")
+    said = warned(r, "domain.sides_closing: 0.0004 m/s, shared out among the contacts of some 16 floes")
+    assert said and warned(r, "the position projection met its limit of work") and r.summary["unprojected_steps"] > 0
+    assert r.summary["locked_steps"] == 0
+    case["solver"]["tolerance"] = float(said[0].rsplit(" ", 1)[1])
+    locked = run(tmp_path, changed(case, run__duration=1), name="b")
+    assert locked.summary["locked_steps"] > 5 and not warned(locked, "takes .* for rest")
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_bodies_that_cannot_give_way(tmp_path, name):
     case, locks = SCENES[name]

@@ -70,3 +70,31 @@ def test_a_row_against_the_wall(tmp_path, n, s):
     assert r.summary["rafted_energy_j"] == pytest.approx(2 / KAPPA * Q0 * area, rel=0.005)
     assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area, rel=0.005)
     assert r.summary["raft_friction_work_j"] == pytest.approx(0.5 * SHEETS * (n - 1) * over[-1]**2, rel=0.03)
+
+
+@pytest.mark.parametrize("law", [{"rafting": {"kappa": 5}}, {"crushing": {"pressure": "3 kPa"}}])
+def test_ice_whose_bound_moves_it_by_less_than_the_tolerance_gives_way(tmp_path, law):
+    """A corner of a floe of 30 m hits the edge of another: the bound on a length of h, over a step, is worth a
+    thirtieth of the tolerance. What the hit takes of the energy is the work of the ice, and no other at a tolerance
+    10,000 times finer. Red when the residual is that of the natural map alone: no load, no work, and the projection
+    holds the first floe."""
+    a, half, found = 30.0, 15.0, []
+    corners = [[-half, -half], [half, -half], [half, half], [-half, half]]
+    for tolerance in (1e-3, 1e-7):
+        r = run(tmp_path, {
+            "run": {"dt": 0.2, "duration": 60},
+            "domain": {"frame": "geographic", "length": 400, "width": 400, "ends": "open", "sides": "open"},
+            "ice": {"concentration": 0, "size": a, "thickness": 0.15, "density": RHO_I, "start": "rest", **law,
+                    "drag": {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}},
+            "floes": [{"shape": "polygon", "vertices": corners, "x": 100, "y": 0, "yaw": "45 deg", "vx": 0.3},
+                      {"shape": "polygon", "vertices": corners, "x": 100 + half * (1 + 2**0.5) + 0.5, "y": 0}],
+            "body": {"shape": "none"}, "tow": {"mode": "none"},
+            "solver": {"reference_speed": 1, "tolerance": tolerance}, "output": {"frame_interval": 60},
+        }, name=f"{tolerance}")
+        energy = r.series("kinetic_energy")
+        work = sum(r.summary[key] for key in ("raft_edge_work_j", "raft_friction_work_j", "crushed_work_j"))
+        assert work == pytest.approx(energy[0] - energy[-1], rel=0.01) and r.summary["unconverged_steps"] == 0
+        mass = RHO_I * 0.15 * a * a  # 0.15 m thick
+        assert work == pytest.approx(mass * 0.3**2 / 4, rel=0.01)  # both go on at half of the speed
+        found.append(work)
+    assert found[0] == pytest.approx(found[1], rel=1e-3)

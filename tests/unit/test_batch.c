@@ -170,7 +170,7 @@ static void check_residual(knot_of_floes *four, knot_of_floes *one)
         const bt_contact *u = &one->contacts[i];
         const bt_limit *k = one->cell.laws.limits ? &one->limits[i] : NULL;
         const bt_mass *m = &one->in_place[i].mass;
-        const double r = bt_contact_residual(u, m, k, one->v, &e.squares), *x = one->in_place[i].before;
+        const double r = bt_contact_residual(u, m, k, one->v, p.tolerance, &e.squares), *x = one->in_place[i].before;
         e.most = bt_max(e.most, r);
         e.rows += u->n > 0 ? u->n + 1 : 2;
         e.bad += r > BT_NEAR * p.tolerance;
