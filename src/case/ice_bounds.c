@@ -171,9 +171,9 @@ void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings)
         const double share = 2 * closing / (across + 1);
         if (!(closing > 0 && size > 0 && share < 2 * accepted)) continue;
         bt_errors_add(warnings,
-                      "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, is "
-                      "%.2g m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls may bear "
-                      "no load, without a word; set solver.tolerance: %.1g",
+                      "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, "
+                      "is %.2g m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls "
+                      "may bear no load, without a word; set solver.tolerance: %.1g",
                       k ? "sides" : "ends", closing, across, share, accepted,
                       c->solver.tolerance * 0.1 * share / accepted);
     }

@@ -153,7 +153,8 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
     if (h->unprojected > 0)
         bt_errors_add(&s->warnings,
                       "in %lld of %lld steps the position projection met its limit of work and left overlap: bodies "
-                      "are pressed where there is no room, slower than the tolerance tells; lower solver.tolerance, or %s",
+                      "are pressed where there is no room, slower than the tolerance tells; lower solver.tolerance, "
+                      "or %s",
                       (long long)h->unprojected, (long long)h->n, BT_LOCKED_REMEDY);
     if (h->outrun)
         bt_errors_add(
