@@ -169,7 +169,10 @@ MUTANTS = {
         ("bt_clamp(u->lt - wt * m->mt, u->mu * total)", "u->lt - wt * m->mt", "residual without the cone"),
         ("return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY;", "return bt_max(worst, fabs(r));",
          "a NaN counts as solved"),
-        ("        worst = bt_max(worst, fabs(r));\n        *sum", "        *sum", "normal rows do not count"),
+        ("        worst = bt_max(worst, r);\n        *sum", "        *sum", "normal rows do not count"),
+        ("if (k && more > 0) {", "if (false) {", "ice that bears nothing below the tolerance"),
+        ("bt_max(fabs(x), fabs(y)), lacks) : INFINITY", "bt_max(fabs(x), fabs(y)), 0) : INFINITY",
+         "sheets that bear nothing below the tolerance"),
         ("return isfinite(x + y) ?", "return true ?", "NaN in sheets counts as solved"),
     ]),
     "src/solve/limit.h": (SOLVE + ["physics/test_crush"], [
