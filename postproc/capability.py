@@ -376,9 +376,10 @@ def main(argv=None):
     load = case_value(case, "tow.line.breaking_load", 0.0)
     # keys whose default follows from what is varied are varied with it
     alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
+    title = case.get("run.title", "none")
     found = {
         "case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
-        "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
+        "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
         "range": [start, end], "resolution": resolution, "for": across,
         "for_unit": case.get(across, "").partition(" ")[2],
         "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,

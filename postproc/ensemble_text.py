@@ -61,7 +61,7 @@ def means(s, markdown):
         "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
         "its slowest cosine waves. "
         "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body "
-        "stood still, N window not steady, S short window, X stopped early, O other warning."
+        "stood still, N window not steady, S short window, F met little ice, X stopped early, O other warning."
     )
     drifting = [
         f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
@@ -275,8 +275,8 @@ def report(s, markdown=False):
     if s["members_without_folder"]:
         lines.append(
             f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
-            f"no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their "
-            f"peaks not at all."
+            f"no folder here ({listed(s['members_without_folder'])}): whether their windows are steady is not "
+            f"known, nor what they warn of but by numbers, their peaks not at all."
         )
     heavy = [
         c["label"]

@@ -47,7 +47,7 @@ def spread(x, n, half, log):
 MARKS = {
     "sound": ({"marker": "o", "markersize": 3.6, "markeredgewidth": 0, "color": style.ICE, "alpha": 0.35}, "{}"),
     "doubtful": ({"marker": "o", "markersize": 4.2, "markeredgewidth": 0.9, "color": style.ICE, "alpha": 0.6,
-                  "markerfacecolor": "none"}, "{} in doubt: not steady, too short, unconverged or stopped"),
+                  "markerfacecolor": "none"}, "{} in doubt: not steady, too short, little ice, unconverged or stopped"),
     "jammed": ({"marker": "x", "markersize": 5, "markeredgewidth": 1.2, "color": style.JAM},
                "{} where the body stood still"),
 }
@@ -233,10 +233,7 @@ def draw_sweep(e, key):
     if not log_x:
         style.times(grid.flat[0].xaxis, reading(key, e.units[key])[0])
         margin = 0.06 * (values.max() - values.min())
-        grid.flat[0].set_xlim(max(0.0 if values.min() >= 0 else -np.inf,
-                                  values.min() - margin),
-                              min(1.0,
-                                  values.max() + margin) if key == "ice.concentration" else values.max() + margin)
+        grid.flat[0].set_xlim(values.min() - margin, values.max() + margin)  # fields stand beside their value
     for axes in grid.flat[:len(shown)]:
         handles, labels, away = style.legend_of(axes)
         extra |= {label: handle for handle, label in zip(handles, labels) if label not in extra}

@@ -436,6 +436,21 @@ def test_estimates_are_those_of_each_condition(tmp_path):
     matplotlib.pyplot.close("all")
 
 
+def test_fields_beside_a_value_of_zero_are_in_the_picture(tmp_path):
+    """Red when the axis begins at the least value: half of its fields stand left of it."""
+    some = [made_up.member(np.full(30, 100.0 + w + r), {"tow.direction": w}, c)
+            for c, w in enumerate((0.0, 0.5)) for r in range(4)]
+    e = Ensemble(made_up.write(tmp_path / "a", some))
+    axes = plot_ensemble.draw_sweep(e, "tow.direction").axes[0]
+    dots = np.concatenate([line.get_xdata() for line in axes.lines if line.get_marker() == "o"])
+    low, high = axes.get_xlim()
+    assert len(dots) == 8 and low < dots.min() < 0 and dots.max() < high
+    shutil.rmtree(e.path / "members")
+    alone = plot_ensemble.draw_sweep(Ensemble(e.path), "tow.direction")
+    assert "8 without folders, whose doubts are not known" in " ".join(t.get_text() for t in alone.texts)
+    matplotlib.pyplot.close("all")
+
+
 def test_negative_values_are_in_the_picture(tmp_path):
     some = [made_up.member(np.full(30, 100.0 + w + r), {"air.wind_x": w}, c)
             for c, w in enumerate((-10.0, 0.0, 10.0)) for r in range(2)]
