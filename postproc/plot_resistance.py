@@ -53,10 +53,10 @@ def read(path):
         if not isinstance(estimates, dict) or "curves" not in estimates:
             raise RunError(run.path / "summary.json", "holds no estimates",
                            "run a case with a towed body, with this version")
-        if estimates.get("speed_along_m_s") is None and np.isfinite(run.adrift):
-            raise RunError(run.path / "summary.json", f"is of a tow whose last line parted at {run.adrift:g} s",
-                           "run it with a stronger line, or end it before")
         if estimates.get("speed_along_m_s") is None:
+            if np.isfinite(run.adrift):
+                raise RunError(run.path / "summary.json", f"is of a tow whose last line parted at {run.adrift:g} s",
+                               "run it with a stronger line, or end it before")
             raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):

@@ -152,10 +152,10 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
                       h->locked_steps, (long long)h->n);
     if (h->unprojected > 0)
         bt_errors_add(&s->warnings,
-                      "in %lld of %lld steps the position projection met its limit of work and left overlap: bodies "
-                      "are pressed where there is no room, slower than the tolerance tells; lower solver.tolerance, "
-                      "or %s",
-                      (long long)h->unprojected, (long long)h->n, BT_LOCKED_REMEDY);
+                      "in %lld of %lld steps the position projection met its limit of work and left overlap: raise "
+                      "solver.position_sweeps, or, where bodies are pressed together slower than the tolerance tells, "
+                      "lower solver.tolerance",
+                      (long long)h->unprojected, (long long)h->n);
     if (h->outrun)
         bt_errors_add(
             &s->warnings,
