@@ -193,6 +193,7 @@ typedef struct bt_step_stats {
     int64_t residual_checks; ///< of contacts by residual passes, and by velocities formed anew for them
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed
+    int64_t misjudged;       ///< rows at the end of pairs that pass, and pairs that meet without (contact/passing.h)
     double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s
     bool converged;
     bool locked;             ///< it did not, and some bodies cannot give way to any load (src/solve/locked.h)

@@ -101,7 +101,6 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
         if (m->n_points == 0 && !bt_laws[law]->contact) continue; // sheets are of one law alone
         if (bt_law_on(&w->par, law) && bt_laws[law]->applies(w, m->a, m->b)) bt_laws[law]->bound(w, t, j, p, m);
     }
-    for (int i = 0; i < m->n_points; i++) l->place[i] = bt_max(t->gaps[j].gap[i], 0) / w->par.dt;
 }
 
 double bt_laws_overlap(const bt_cell *t)

@@ -12,9 +12,11 @@
 #include <string.h>
 
 #include "contact/law.h"
+#include "contact/passing.h"
 #include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
+#define RELEASED 1e9 // m, a gap that nothing closes
 
 void bt_pack_scratch_free(bt_pack_scratch *s)
 {
@@ -97,7 +99,7 @@ static void hold(const bt_cell *t, bt_pack_scratch *s)
         if (at < 0) continue;
         const bt_contact *u = &t->contacts[at];
         const bt_gaps *g = &t->gaps[at];
-        s->held[k] = (bt_held){u->n, {g->feature[0], g->feature[1]}, {u->ln[0], u->ln[1]}, u->lt};
+        s->held[k] = (bt_held){u->n, {g->feature[0], g->feature[1]}, {u->ln[0], u->ln[1]}, u->lt, g->row};
     }
 }
 
@@ -148,14 +150,13 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
         g->feature[i] = m->p[i].feature;
     }
     if (w->par.warm_start) inherit(m, h, u);
-    bt_pack_bias(w, u, g, 1);
 }
 
-/// Normal bias b of model equation (1).
-static double bias_of(const bt_world *w, const bt_contact *u, double gap, int i, double restitution)
+/// Normal bias b of model equation (1). Of a pair that passes: contact/passing.h.
+static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, double restitution)
 {
     const bt_bodies *b = &w->bodies;
-    if (restitution > 0) {
+    if (restitution > 0 && g->row != BT_ROW_RELEASED) {
         // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
         // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
         // from the slop on, or rounding would decide which of two points of a square hit rebounds.
@@ -163,16 +164,21 @@ static double bias_of(const bt_world *w, const bt_contact *u, double gap, int i,
         // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
         const double approach = bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
         const double closing = bt_normal_velocity(u, i, &b->vel_free[u->a], &b->vel_free[u->b]);
-        if (approach < -w->par.rest_speed && gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
+        if (approach < -w->par.rest_speed && g->gap[i] + w->par.dt * bt_min(closing, 0) < w->par.slop)
             return restitution * bt_max(approach, bt_min(closing, 0));
     }
-    return bt_max(gap, 0) / w->par.dt;
+    return bt_pack_place(w, g, i);
+}
+
+double bt_pack_place(const bt_world *w, const bt_gaps *g, int i)
+{
+    return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
 }
 
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share)
 {
     const double restitution = share * w->bodies.restitution[u->b];
-    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g->gap[i], i, restitution);
+    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g, i, restitution);
 }
 
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
@@ -203,10 +209,8 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
             continue;
         }
         fill_contact(w, &s->man[i], s->pair[i], &s->held[i], u, &t->gaps[at]);
-        if (bounded) {
-            bt_laws_bound(w, t, at, p, &s->man[i]);
-            bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
-        }
+        if (bounded) bt_laws_bound(w, t, at, p, &s->man[i]); // the gaps may be others after it
+        bt_passing_set(w, t, at, bt_passing_state(w, t, at, &s->man[i], &s->held[i]));
         p->contact = at;
     }
 }

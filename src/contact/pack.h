@@ -11,6 +11,7 @@ typedef struct bt_held {
     int32_t n;           ///< points, 0 = there was none
     uint32_t feature[2];
     double ln[2], lt;    ///< N s
+    int32_t row;         ///< bt_row_state
 } bt_held;
 
 /// Manifolds of one cell, in the order of its pairs; one a thread.
@@ -38,5 +39,9 @@ void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u);
 
 /// Normal biases of a contact with these gaps, `share`: factor on the restitution.
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
+
+/// Velocity at which point i of these gaps comes to touch at the end of the step, m/s; beyond all speeds where the row
+/// is released (contact/passing.h).
+double bt_pack_place(const bt_world *w, const bt_gaps *g, int i);
 
 #endif

@@ -213,6 +213,7 @@ static const row rows[] = {
     {"history/restitution_cut", "1", "steps in which rebounds were lowered", "one"},
     {"history/repeats", "1", "solutions that were repeated", "one"},
     {"history/outrun", "1", "steps whose last solution outran the search for pairs", "one"},
+    {"history/misjudged", "1", "loads of pairs that pass, and pairs that meet without one", "one"},
     // the ice as it was
     {"field/offsets", "1", "floe i has the vertices offsets[i] up to offsets[i + 1]", "floe_end"},
     {"field/vertices", "m", "outlines, frame of the floe, anticlockwise about the centroid", "floe_vertex xy"},

@@ -78,6 +78,7 @@ static const bt_total totals[] = {
     TOTAL(I64, restitution_cut, STEPS, restitution_cut),
     TOTAL(I64, repeats, SUM, repeats),
     TOTAL(I64, outrun, STEPS, outrun),
+    TOTAL(I64, misjudged, SUM, misjudged),
 };
 
 enum { N_TOTALS = sizeof totals / sizeof *totals };

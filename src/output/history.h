@@ -46,7 +46,7 @@ typedef struct bt_history {
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, sum_checks, sum_projected, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double locked_steps;
-    int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
+    int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun, misjudged;
     bt_total_value laws[BT_MAX_LAW_TOTALS]; ///< of the contact laws, in their order (contact/law.h)
 } bt_history;
 

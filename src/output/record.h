@@ -62,6 +62,7 @@ typedef struct bt_sample {
     double added_energy;    ///< 1 if it is more than the residual and rounding explain
     double repeats;         ///< times the step was solved again because floes outran the contact margin
     double outrun;          ///< 1 if they still did in the last solution
+    double misjudged;       ///< rows at the end of pairs that pass each other, and pairs that meet without a row
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
     double collision_resistance; ///< N, part of ice_resistance by collisions (impact.h); the rest is quasi-static
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart

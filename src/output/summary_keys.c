@@ -372,6 +372,8 @@ static const bt_json_key rows[] = {
     OF_HISTORY("repeated_solves", repeats, "1",
         "times a step was solved again because floes outran the contact margin"),
     OF_HISTORY("outrun_steps", outrun, "1", "steps whose last solution still outran the margin"),
+    OF_HISTORY("misjudged_contacts", misjudged, "1",
+        "contacts that bore load at the end of a step although the pair passed, and pairs that met without one"),
     OF_HISTORY("restitution_cut_steps", restitution_cut, "1",
         "steps whose restitution was lowered so that the contacts add no energy"),
     OF_HISTORY("momentum_residual", max_momentum_residual, "1",

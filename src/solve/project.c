@@ -20,6 +20,7 @@
 
 #include "contact/law.h"
 #include "contact/pack.h"
+#include "contact/passing.h"
 #include "contact/row.h"
 #include "solve/solver.h"
 #include "partition/domain.h"
@@ -71,6 +72,10 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
         const bt_contact *u = &cell->contacts[j];
         bt_gaps *g = &cell->gaps[j];
         for (int i = 0; i < u->n; i++) {
+            if (g->row == BT_ROW_RELEASED) { // no row
+                g->gap[i] = w->par.dt * u->bias[i];
+                continue;
+            }
             g->gap[i] += w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
             if (cell->laws.limits) g->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->gap[i]);

@@ -5,6 +5,7 @@
 
 #include "contact/work.h"
 #include "contact/contacts.h"
+#include "contact/passing.h"
 #include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
@@ -204,6 +205,28 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
     *t0 = now;
 }
 
+/// Solve, and again while pairs that bear load are found to pass each other, or pairs that were let pass to meet
+/// (contact/passing.h). The last rounds only give rows back.
+static void solve_passing(bt_world *w)
+{
+    enum { MAX_ROUNDS = 8, MAX_RELEASES = 3 };
+    bt_step_stats *st = &w->stats;
+    int64_t sweeps = 0, updates = 0, moves = 0, checks = 0;
+    for (int round = 0;; round++) {
+        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
+        sweeps += st->sweeps;
+        updates += st->unit_updates;
+        moves += st->unit_moves;
+        checks += st->residual_checks;
+        st->misjudged = st->converged ? bt_passing_review(w, round < MAX_RELEASES) : 0;
+        if (st->misjudged == 0 || round == MAX_ROUNDS) break;
+    }
+    st->sweeps = sweeps;
+    st->unit_updates = updates;
+    st->unit_moves = moves;
+    st->residual_checks = checks;
+}
+
 /// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
 /// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
 /// margin has grown are detected again and the step is solved again, from the impulses found so far.
@@ -221,7 +244,7 @@ static void solve_contacts(bt_world *w)
     for (bool done = false; !done;) {
         bt_contacts_detect(w, again); // gaps and J at X1
         clock_phase(w, &st->phases.detect, &t0);
-        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
+        solve_passing(w);
         clock_phase(w, &st->phases.solve, &t0);
         sweeps += st->sweeps;
         updates += st->unit_updates;

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+// Rows of pairs that pass each other are released, and come back where the pair meets; passing.h.
+#include "contact/passing.h"
+
+#include "contact/law.h"
+#include "contact/row.h"
+#include "geometry/sweep.h"
+#include "partition/domain.h"
+#include "space/phases.h"
+
+bt_row_state bt_passing_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held)
+{
+    if (w->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
+    if (w->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
+    if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
+    for (int i = 0; i < m->n_points; i++)
+        if (m->p[i].gap <= w->par.slop || t->gaps[j].gap[i] <= w->par.slop) return BT_ROW_STAYS;
+    for (int law = 0; t->laws.limits && law < BT_ALL_LAWS; law++)
+        if (t->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
+    return BT_ROW_OPEN;
+}
+
+/// Part `part` of body i, as bt_contacts_parts sees it.
+static bt_moving moving_part(const bt_bodies *b, bt_idx i, int part, const bt_vel *v)
+{
+    const int64_t first = b->offset[i] + part;
+    return (bt_moving){b->mark[first].count, b->outline + 2 * first, v->x, v->y, v->w};
+}
+
+/// Do the bodies of contact u meet if they bear no load on each other, and all others as they do? All of their parts
+/// nearby count: where several touch at one place, one row stands for all (merge.c).
+static bool meet_without(const bt_world *w, const bt_cell *t, const bt_contact *u)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_pair *pairs = t->search.pairs;
+    bt_vel va = b->vel[u->a], vb = b->vel[u->b];
+    bt_apply(u, -(u->ln[0] + u->ln[1]), -(u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1]),
+             -(u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1]), -u->lt, b->inv[u->a], b->inv[u->b], &va, &vb);
+    double d[2];
+    bt_bodies_offset(w, u->a, u->b, d);
+    bt_idx first = u->pair, end = u->pair + 1;
+    while (first > 0 && pairs[first - 1].a == u->a && pairs[first - 1].b == u->b) first--;
+    while (end < t->search.n_pairs && pairs[end].a == u->a && pairs[end].b == u->b) end++;
+    for (bt_idx i = first; i < end; i++) {
+        const bt_moving p = moving_part(b, u->a, pairs[i].part[0], &va), q = moving_part(b, u->b, pairs[i].part[1], &vb);
+        if (bt_sweep_meets(&p, &q, d[0], d[1], w->par.slop, w->par.dt)) return true;
+    }
+    return false;
+}
+
+void bt_passing_set(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state)
+{
+    bt_contact *u = &t->contacts[j];
+    bt_gaps *g = &t->gaps[j];
+    g->row = state;
+    if (state == BT_ROW_RELEASED) u->ln[0] = u->ln[1] = u->lt = 0;
+    bt_pack_bias(w, u, g, 1);
+    if (t->laws.limits)
+        for (int i = 0; i < u->n; i++) t->laws.limits[j].place[i] = bt_pack_place(w, g, i);
+}
+
+static void review_cell(bt_world *w, bt_idx k, const void *context, bt_totals *totals)
+{
+    const bool release = *(const bool *)context;
+    bt_cell *t = &w->cells->cell[k];
+    int changed = 0;
+    for (bt_idx j = 0; j < t->n_contacts; j++) {
+        const bt_contact *u = &t->contacts[j];
+        const bool released = t->gaps[j].row == BT_ROW_RELEASED;
+        if (t->gaps[j].row == BT_ROW_STAYS || (!released && u->ln[0] == 0 && u->ln[1] == 0)) continue;
+        if (meet_without(w, t, u) != released) continue;
+        if (released) bt_passing_set(w, t, j, BT_ROW_STAYS);
+        else if (release) bt_passing_set(w, t, j, BT_ROW_RELEASED);
+        changed++;
+    }
+    if (changed > 0) bt_sum_add(&totals->sum[0], changed);
+}
+
+int64_t bt_passing_review(bt_world *w, bool release)
+{
+    bt_totals t = {.n_sums = 1};
+    bt_phases_any_order(w, review_cell, &release, &t);
+    bt_domain_reduce(w, &t);
+    return (int64_t)bt_sum_value(&t.sum[0]);
+}

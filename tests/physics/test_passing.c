@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+// Pairs that pass each other bear no load, whatever the step, and those that meet do; held against the distance of the
+// outlines at many instants of the step.
+#include "scene.h"
+
+#include "contact/passing.h"
+
+enum { INSTANTS = 1500 };
+
+/// Squared distance of point x from the segment e..f.
+static double squared_distance(const double *x, const double *e, const double *f)
+{
+    const double dx = f[0] - e[0], dy = f[1] - e[1], px = x[0] - e[0], py = x[1] - e[1];
+    const double t = fmax(0, fmin(1, (px * dx + py * dy) / (dx * dx + dy * dy)));
+    return (px - t * dx) * (px - t * dx) + (py - t * dy) * (py - t * dy);
+}
+
+static bool inside(const double *x, int n, const double *v)
+{
+    for (int i = 0; i < n; i++) {
+        const double *e = v + 2 * i, *f = v + 2 * ((i + 1) % n);
+        if ((f[0] - e[0]) * (x[1] - e[1]) - (f[1] - e[1]) * (x[0] - e[0]) < 0) return false;
+    }
+    return true;
+}
+
+/// Distance of two convex polygons, 0 when one holds a corner of the other.
+static double distance_of(int np, const double *p, int nq, const double *q)
+{
+    double least = INFINITY;
+    for (int side = 0; side < 2; side++) {
+        const double *a = side ? q : p, *b = side ? p : q;
+        const int na = side ? nq : np, nb = side ? np : nq;
+        for (int i = 0; i < na; i++) {
+            if (inside(a + 2 * i, nb, b)) return 0;
+            for (int j = 0; j < nb; j++)
+                least = fmin(least, squared_distance(a + 2 * i, b + 2 * j, b + 2 * ((j + 1) % nb)));
+        }
+    }
+    return sqrt(least);
+}
+
+/// Outline of body i, t seconds after `pose` with velocity v.
+static int moved(const bt_world *w, bt_idx i, bt_pose pose, bt_vel v, double t, double *out)
+{
+    const bt_bodies *b = &w->bodies;
+    const double c = cos(pose.yaw + t * v.w), s = sin(pose.yaw + t * v.w);
+    const int n = bt_body_corners(b, i);
+    for (int k = 0; k < n; k++) {
+        const double *x = b->vertices + 2 * (b->offset[i] + k);
+        out[2 * k] = pose.x + t * v.x + c * x[0] - s * x[1];
+        out[2 * k + 1] = pose.y + t * v.y + s * x[0] + c * x[1];
+    }
+    return n;
+}
+
+/// The least distance of two bodies over the step.
+static double nearest_passage(const bt_world *w, bt_idx i, bt_pose pi, bt_vel vi, bt_idx j, bt_pose pj, bt_vel vj)
+{
+    double p[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], least = INFINITY;
+    for (int k = 0; k <= INSTANTS; k++) {
+        const double t = w->par.dt * k / INSTANTS;
+        const int n = moved(w, i, pi, vi, t, p), m = moved(w, j, pj, vj, t, q);
+        least = fmin(least, distance_of(n, p, m, q));
+    }
+    return least;
+}
+
+static bool same_velocity(bt_vel a, bt_vel b) { return a.x == b.x && a.y == b.y && a.w == b.w; }
+
+/// A pair of random floes whose ways cross or nearly so.
+static bt_world *random_pair(uint64_t *rng, bool turning)
+{
+    bt_params p = scene_params(ldexp(0.1, (int)(6 * scene_uniform(rng))), 1);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    const double way = 0.2 + 4 * scene_uniform(rng), restitution = scene_uniform(rng) < 0.3 ? 0.5 : 0;
+    for (int k = 0; k < 2; k++) {
+        double v[64];
+        const int n = scene_random_polygon(rng, 0.5, v);
+        bt_body_def d = scene_prism(n, v, 900);
+        d.yaw = 6 * scene_uniform(rng);
+        d.friction = 0.3, d.restitution = restitution;
+        if (turning) d.yaw_rate = (2 * scene_uniform(rng) - 1) / p.dt;
+        if (k == 1) {
+            const double from = 6 * scene_uniform(rng), apart = 1.2 + way * scene_uniform(rng);
+            const double towards = from + BT_PI + (2 * scene_uniform(rng) - 1);
+            d.x = apart * cos(from), d.y = apart * sin(from);
+            d.vx = way / p.dt * cos(towards), d.vy = way / p.dt * sin(towards);
+        }
+        bt_world_add(w, &d);
+    }
+    return w;
+}
+
+// Red: a review that releases nothing (some 300 of those that pass are stopped or turned); one that looks at the end of
+// the step alone, or does not turn the outlines.
+static void what_passes_keeps_its_velocity_and_what_meets_does_not(void **state)
+{
+    (void)state;
+    uint64_t rng = 11;
+    int passed = 0, close = 0, met = 0;
+    for (int k = 0; k < 3000; k++) {
+        const bool turning = k % 2;
+        bt_world *w = random_pair(&rng, turning);
+        const bt_pose pose[2] = {w->bodies.pose[0], w->bodies.pose[1]};
+        const bt_vel v[2] = {w->bodies.vel[0], w->bodies.vel[1]};
+        const double least = nearest_passage(w, 0, pose[0], v[0], 1, pose[1], v[1]);
+        bt_world_step(w);
+        const bool kept = same_velocity(w->bodies.vel[bt_world_index(w, 0)], v[0]) &&
+                          same_velocity(w->bodies.vel[bt_world_index(w, 1)], v[1]);
+        if (least > 1.02 * w->par.slop) {
+            passed++, close += least < 0.1;
+            if (!kept) fail_msg("pair %d passes at %g m and is stopped", k, least);
+        } else if (least == 0 && !turning) { // the row of a turning pair is linear in the turn, and may not know
+            met++;
+            if (kept) fail_msg("pair %d meets and bears no load", k);
+        }
+        assert_int_equal(w->stats.misjudged, 0);
+        bt_world_free(w);
+    }
+    assert_true(passed > 1000 && close > 100 && met > 200);
+}
+
+/// A pusher of given speed behind n squares with equal gaps between them.
+static bt_world *pushed_row(int n, double gap, double dt)
+{
+    bt_params p = scene_params(dt, 1);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    double s[8];
+    scene_square(1, s);
+    bt_body_def d = scene_prism(4, s, 900);
+    for (int k = 0; k <= n; k++) {
+        d.x = k * (1 + gap), d.y = 0.02 * (k % 3);
+        d.motion = k == 0 ? BT_KINEMATIC : BT_DYNAMIC;
+        d.vx = k == 0 ? 1 : 0;
+        bt_world_add(w, &d);
+    }
+    return w;
+}
+
+// A pusher at 1 m/s goes V dt in the step, and the k-th floe is moved by what is left of that after k gaps: in the same
+// step, however long the row. Red: rows left out before the solve, of pairs that pass by their free velocities.
+static void a_push_runs_through_a_row_within_the_step(void **state)
+{
+    (void)state;
+    for (int n = 2; n <= 20; n++)
+        for (double share = 0.1; share < 1.05; share += 0.3) {
+            const double dt = 0.5, gap = share * dt;
+            bt_world *w = pushed_row(n, gap, dt);
+            bt_world_step(w);
+            for (int k = 1; k <= n; k++)
+                CHECK_CLOSE(w->bodies.vel[bt_world_index(w, k)].x, fmax(0, 1 - k * gap / dt), 1e-6);
+            assert_int_equal(w->stats.misjudged, 0);
+            bt_world_free(w);
+        }
+}
+
+/// Floes of all sizes that are driven together, turning.
+static bt_world *random_jam(uint64_t *rng, double dt)
+{
+    bt_params p = scene_params(dt, 1);
+    p.tolerance = 1e-6, p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    enum { N = 6 };
+    const double pitch = 1.05 + 0.4 * scene_uniform(rng);
+    for (int k = 0; k < N * N; k++) {
+        double v[64];
+        const int n = scene_random_polygon(rng, 0.55, v);
+        bt_body_def d = scene_prism(n, v, 900);
+        d.x = pitch * (k % N - 2.5), d.y = pitch * (k / N - 2.5), d.yaw = 6 * scene_uniform(rng);
+        d.vx = (scene_uniform(rng) - 0.5 - 0.3 * d.x) / dt, d.vy = (scene_uniform(rng) - 0.5 - 0.3 * d.y) / dt;
+        d.yaw_rate = (2 * scene_uniform(rng) - 1) / dt;
+        d.friction = 0.3;
+        bt_world_add(w, &d);
+    }
+    return w;
+}
+
+/// Velocities of both bodies of a contact without its own impulse.
+static void without(const bt_world *w, const bt_contact *u, bt_vel v[2])
+{
+    const bt_bodies *b = &w->bodies;
+    const double jn = u->ln[0] + u->ln[1], jx = jn * u->nx - u->lt * u->ny, jy = jn * u->ny + u->lt * u->nx;
+    const double ma = u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1] + u->lt * u->rat,
+                 mb = u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1] + u->lt * u->rbt;
+    v[0] = b->vel[u->a], v[1] = b->vel[u->b];
+    v[0].x += b->inv[u->a].m * jx, v[0].y += b->inv[u->a].m * jy, v[0].w += b->inv[u->a].i * ma;
+    v[1].x -= b->inv[u->b].m * jx, v[1].y -= b->inv[u->b].m * jy, v[1].w -= b->inv[u->b].i * mb;
+}
+
+// Red: released pairs that do not come back; velocities of before the solve; a row that is judged with its own impulse.
+static void in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not(void **state)
+{
+    (void)state;
+    uint64_t rng = 5;
+    int loaded = 0, released = 0;
+    for (int k = 0; k < 60; k++) {
+        bt_world *w = random_jam(&rng, 0.2 + k % 5);
+        for (int s = 0; s < 4; s++) {
+            bt_pose *before = malloc((size_t)w->bodies.n_global * sizeof *before);
+            for (bt_gid g = 0; g < w->bodies.n_global; g++) before[g] = w->bodies.pose[bt_world_index(w, g)];
+            bt_world_step(w);
+            assert_true(w->stats.momentum_residual < 1e-9);
+            assert_false(w->stats.added_energy);
+            if (!w->stats.converged || w->stats.misjudged > 0) { // counted
+                free(before);
+                continue;
+            }
+            for (bt_idx c = 0; c < w->cells->n; c++)
+                for (bt_idx j = 0; j < w->cells->cell[c].n_contacts; j++) {
+                    const bt_contact *u = &w->cells->cell[c].contacts[j];
+                    const int row = w->cells->cell[c].gaps[j].row;
+                    const bool open = row == BT_ROW_OPEN && u->ln[0] + u->ln[1] > 0;
+                    if (!open && row != BT_ROW_RELEASED) continue;
+                    // no row in the position projection, which leaves there the gaps that it saw
+                    if (!open) assert_true(w->cells->cell[c].gaps[j].gap[0] > 1e6);
+                    bt_vel v[2];
+                    without(w, u, v);
+                    const double least = nearest_passage(w, u->a, before[w->bodies.gid[u->a]], v[0], u->b,
+                                                         before[w->bodies.gid[u->b]], v[1]);
+                    if (open) assert_true(least <= 1.1 * w->par.slop);
+                    else assert_true(least >= 0.99 * w->par.slop && u->ln[0] == 0 && u->ln[1] == 0 && u->lt == 0);
+                    loaded += open, released += !open;
+                }
+            free(before);
+        }
+        bt_world_free(w);
+    }
+    assert_true(loaded > 500 && released > 100);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_passes_keeps_its_velocity_and_what_meets_does_not),
+        cmocka_unit_test(a_push_runs_through_a_row_within_the_step),
+        cmocka_unit_test(in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
