@@ -443,7 +443,8 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     bt_h5_attr_int(h, "/", "complete", finished + failed == t->n);
 }
 
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err)
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_member_notes *warnings,
+                             bt_errors *err)
 {
     table t = {0};
     fill(&t, s, dir, records);
@@ -464,6 +465,9 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
                       path, t.unread);
         status = BT_ERR_IO;
     }
+    bt_member_notes_free(warnings);
+    *warnings = t.warnings;
+    t.warnings = (bt_member_notes){0};
     free(part);
     free(path);
     release(&t);
