@@ -40,7 +40,7 @@ def test_a_body_that_overtakes_its_towing_end_is_reported(tmp_path):
     time = whole.series("time")[np.abs(whole.series("carriage_x") - whole.series("body_x")) < 29.9]
     assert len(time) > 50
     assert warned(whole, "within the hull for") and "the body has overtaken it" in whole.reason
-    found = re.search(r"within the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", reason(whole))
+    found = re.search(r"within the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", whole.reason)
     assert abs(float(found[1]) - 2 * len(time)) < 10 and abs(float(found[2]) - time[0]) < 6
     part = run(tmp_path, case, "--steps", str(int(time[10] / 2)), name="part")
     assert call("resume", part.dir).returncode == DONE
@@ -89,7 +89,7 @@ def test_a_body_on_a_line_follows_for_some_lengths_of_it(tmp_path):
         k = int(start / 2)
         course = np.degrees(np.arctan2(r.series("body_vy"), r.series("body_vx")))[k:k + 100].mean()
         assert abs(course - 90) > 8 if turns else abs(course - 90) < 6
-        assert bool(re.search("the course (of the body, behind its line, still )?changes by", reason(r))) == turns
+        assert bool(re.search("the course (of the body, behind its line, still )?changes by", r.reason)) == turns
 
 
 def test_the_ordered_speed_is_that_over_the_current_of_the_window(tmp_path):

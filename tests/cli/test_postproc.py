@@ -356,7 +356,7 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
 def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
     folder = make_run(tmp_path / "run")
     summary = json.loads((folder / "summary.json").read_text())
-    summary["window"].update(verdict="not steady", reason="it rises")
+    summary["window"].update(verdict="not steady", reasons=[{"code": "trend", "text": "it rises", "values": {}}])
     (folder / "summary.json").write_text(json.dumps(summary))
     with Run(folder) as run:
         assert run.verdict == ("not steady", "it rises") and run.window_name == "window"
