@@ -176,9 +176,10 @@ class CaseRuns:
 
     def call(self, *words):
         """Exit code and messages of a run, or of what is left of it; and whether it met its limit of wall time."""
-        began, left = time.monotonic(), max(1.0, self.last - time.monotonic())
+        began = time.monotonic()
+        left = round(max(1.0, self.last - began), 3)
         code, said = self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
-                               f"{left:.3f}"], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
+                               str(left)], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
                               pass_fds=[self.lock] if self.lock >= 0 else [])
         return code, said, stopped_by_limit(code, time.monotonic() - began, left)
 
