@@ -164,8 +164,9 @@ class CaseRuns:
         if fault:
             self.tell(path, f"{path}: {fault}; the run is made again")
         elif not soundness.available():
-            self.tell(None, f"runs that are there are not checked; {soundness.MISSING}")
-        self._sound[path] = stamp
+            self.tell(None, f"runs that are there are not checked: {soundness.MISSING}")
+        else:
+            self._sound[path] = stamp
         return not fault
 
     def tell(self, what, words):
@@ -250,7 +251,10 @@ class CaseRuns:
     def refuse_copies(self, name, fields):
         """Errors: RunError where two of these fields are the same run: what is decided by their scatter would be
         decided by none. Without floes there is none, and that is true of every field."""
-        ends = [json.loads((self.path(name, i) / "summary.json").read_text()) for i in fields[:2]]
+        ends = []
+        for i in fields[:2]:
+            with Run(self.path(name, i)) as run:
+                ends.append(run.summary)
         first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
         if first is not None and first == second:
             raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or "

@@ -151,7 +151,13 @@ def test_warnings_of_a_study(tmp_path):
     write_case(tmp_path, LOOSE, "base.yml")
     (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2]}}')
     lines = call("check", "study.yml", cwd=tmp_path).stdout.splitlines()
-    assert lines[0] == "study.yml: valid, with warnings in 1 of 2 conditions" and lines[-1].startswith(lines[0] + "; ")
+    assert lines[0] == lines[-1] == "study.yml: valid, with warnings in 1 of 2 conditions"
+    said, = call("check", "base.yml", "--set", "run.dt=0.2", cwd=tmp_path).stdout.splitlines()[-2:-1]
+    assert said.startswith("warning              run.dt: 0.2 s") and lines[-2] == said + " (condition 2: run.dt 0.2)"
+    # of one code the first stands for all
+    (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2, 0.3]}}')
+    lines = call("check", "study.yml", cwd=tmp_path).stdout.splitlines()
+    assert lines[-2] == said + " (condition 2: run.dt 0.2; and 1 more)" and "warning" not in lines[-3]
 
 
 # ---- no sizes of a basin at full scale ----

@@ -289,7 +289,7 @@ def another(path):
     ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json changed since"),
     ("summary.json", cut, "summary.json changed since"), ("summary.json", another, "summary.json changed since"),
     ("summary.json", Path.unlink, "summary.json is missing"), ("result.h5", another, "result.h5 changed since"),
-    ("finished", another, "is of another run"), ("finished", cut, "is damaged"), ("finished", Path.unlink, "missing")])
+    ("finished", another, "is of another run"), ("finished", cut, "changed since"), ("finished", Path.unlink, "missing")])
 def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
     """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
     first = runs_of(tmp_path, CASE)
