@@ -32,7 +32,13 @@ def within(time, start, end):
 
 
 #: exit codes, by the names of the library: of what was asked for, of the case, of a signal or a limit
-USAGE, CASE, SIGNAL = 2, 3, 6
+USAGE, CASE, IO, SIGNAL = 2, 3, 4, 6
+
+
+def notes(found):
+    """Warnings or reasons of a summary, [{"code", "text", "values"}]; what is no such entry is left out."""
+    return [{"code": str(note.get("code")), "text": str(note.get("text", "")), "values": note.get("values") or {}}
+            for note in (found if isinstance(found, list) else ()) if isinstance(note, dict)]
 
 
 class RunError(Exception):
@@ -381,11 +387,16 @@ class Run:
 
     @property
     def verdict(self):
-        """("steady", "not steady" or "too short", the reason); "not judged" of a result that names no verdict: an older
-        one, or without a towed body."""
+        """("steady", "not steady" or "too short", the reasons as one text); "not judged" of a result that names no
+        verdict: one without a towed body."""
         window = self.summary.get("window")
         window = window if isinstance(window, dict) else {}
-        return str(window.get("verdict") or "not judged"), str(window.get("reason") or window.get("warning") or "")
+        return str(window.get("verdict") or "not judged"), "; ".join(r["text"] for r in notes(window.get("reasons")))
+
+    @property
+    def warnings(self):
+        """[{"code", "text", "values"}]: codes and values for programs, texts for readers."""
+        return notes(self.summary.get("warnings"))
 
     @property
     def window_name(self):

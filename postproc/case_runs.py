@@ -3,10 +3,12 @@
 What converge.py and capability.py decide from.
 
     DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by;
-                                begun.json in place of it while the run is under way or stopped
+                                begun.json in place of it while the run is under way or stopped; finished: the record
+                                of its files, as that of an ensemble's member (soundness.py)
 
 A run is kept, and one that was stopped goes on, while the case file, the files that it names, the program and the
-values are what they were. One call at a time works in DIR/SUBJECT: it and its runs hold the lock of the folder.
+values are what they were. One whose files do not fit the record is reported and made anew. One call at a time works in
+DIR/SUBJECT: it and its runs hold the lock of the folder.
 """
 import argparse
 import errno
@@ -14,7 +16,6 @@ import fcntl
 import hashlib
 import json
 import os
-import re
 import shutil
 import socket
 import subprocess
@@ -27,7 +28,8 @@ from pathlib import Path
 
 from bergtow._calls import Calls
 from bergtow._interrupts import held
-from bergtow_read import CASE, USAGE, Refused, Run, RunError
+import soundness
+from bergtow_read import CASE, IO, USAGE, Refused, Run, RunError
 from case_file import files
 
 import numpy as np
@@ -65,10 +67,10 @@ def errors_in(said):
             if not line.startswith("bergtow: warning:")]
 
 
-def stopped_by_limit(code, said):
-    """Has a call of the program met its limit of wall time? Errors: KeyboardInterrupt where a signal or a file `stop`
-    has ended it: whoever wants that one ended wants no others."""
-    if code == STOPPED and re.search(r"stopped by (?!the limit of)", said):
+def stopped_by_limit(code, took, limit):
+    """Has a call of the program met its limit of wall time, s, which it took? Errors: KeyboardInterrupt where a signal
+    or a file `stop` has ended it before: whoever wants that one ended wants no others."""
+    if code == STOPPED and took < limit:
         raise KeyboardInterrupt
     return code == STOPPED
 
@@ -109,6 +111,8 @@ class CaseRuns:
     failed: dict = field(default_factory=dict)   #: {folder: (why, exit code)} of runs that failed in this call
     lock: int = -1         #: of the folder, as locked() gives it
     calls: Calls = field(default_factory=Calls)
+    _sound: dict = field(default_factory=dict)   #: {folder: stamp of its files} of runs that fit their record
+    _told: set = field(default_factory=set)      #: folders of runs that are reported
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
@@ -144,15 +148,41 @@ class CaseRuns:
         except (OSError, ValueError):
             return False
 
+    def record(self, name, i, values):
+        """(name, what it was made by) of a run, as its record has them."""
+        return f"{self.subject}/{name}/{self.path(name, i).name}", json.dumps(self.stamp(i, values)).encode()
+
     def kept(self, name, i, values):
-        return (self.path(name, i) / "summary.json").exists() and self.stamped(name, i, values, "call.json")
+        """Is a run there that was made by this, and is as the program left it? Of one that is not it is said why."""
+        path = self.path(name, i)
+        if not self.stamped(name, i, values, "call.json"):
+            return False
+        stamp = soundness.stamp(path)
+        if stamp and self._sound.get(path) == stamp:
+            return True
+        fault = soundness.fault_of_member(path, *self.record(name, i, values)) if soundness.available() else None
+        if fault:
+            self.tell(path, f"{path}: {fault}; the run is made again")
+        elif not soundness.available():
+            self.tell(None, f"runs that are there are not checked: {soundness.MISSING}")
+        else:
+            self._sound[path] = stamp
+        return not fault
+
+    def tell(self, what, words):
+        """A warning, once."""
+        if what not in self._told:
+            print(f"{self.subject}.py: warning: {words}", file=sys.stderr)
+        self._told.add(what)
 
     def call(self, *words):
-        """Exit code and messages of a run, or of what is left of it."""
-        left = max(1.0, self.last - time.monotonic())
-        return self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
-                               f"{left:.3f}"], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
+        """Exit code and messages of a run, or of what is left of it; and whether it met its limit of wall time."""
+        began = time.monotonic()
+        left = round(max(1.0, self.last - began), 3)
+        code, said = self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
+                               str(left)], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
                               pass_fds=[self.lock] if self.lock >= 0 else [])
+        return code, said, stopped_by_limit(code, time.monotonic() - began, left)
 
     def go_on(self, name, i, values):
         """The same of one that an earlier call has begun; None where there is none to go on with."""
@@ -178,13 +208,18 @@ class CaseRuns:
         if self.kept(name, i, values):
             return None
         path = self.path(name, i)
-        code, said = self.go_on(name, i, values) or self.begin(name, i, values)
-        if stopped_by_limit(code, said):
+        code, said, spent = self.go_on(name, i, values) or self.begin(name, i, values)
+        if spent:
             return SPENT
         if code != DONE:
             why = (errors_in(said) or [f"exit code {code}"])[0]
             self.failed[path] = why, code
             return why
+        try:
+            soundness.keep(path, *self.record(name, i, values))
+        except (OSError, ValueError) as error:
+            self.failed[path] = str(error), IO
+            return str(error)
         os.replace(path / "begun.json", path / "call.json")
         self.made += 1
         return None
@@ -199,7 +234,7 @@ class CaseRuns:
                     self.calls.stop()
                     pool.shutdown()
                 raise
-        self.refuse_copies(name)
+        self.refuse_copies(name, [i for i in range(max(fields, default=-1) + 1) if self.kept(name, i, values)])
         return why
 
     def code_of_failure(self):
@@ -213,11 +248,13 @@ class CaseRuns:
             raise RunError(path, f"this run failed{more}: {why}",
                            "what was found is without it; mend what made it fail", code)
 
-    def refuse_copies(self, name):
-        """Errors: RunError where two fields are the same run: what is decided by their scatter would be decided by
-        none. Without floes there is none, and that is true of every field."""
-        ends = [json.loads(path.read_text()) for path in
-                sorted((self.folder / self.subject / name).glob("f*/summary.json"))[:2]]
+    def refuse_copies(self, name, fields):
+        """Errors: RunError where two of these fields are the same run: what is decided by their scatter would be
+        decided by none. Without floes there is none, and that is true of every field."""
+        ends = []
+        for i in fields[:2]:
+            with Run(self.path(name, i)) as run:
+                ends.append(run.summary)
         first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
         if first is not None and first == second:
             raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or "
@@ -261,14 +298,15 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
     study; a member that fails is none, and the others are gathered as ever."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
     call += [part for text in sets for part in ("--set", text)]
-    if np.isfinite(seconds):
-        call += ["--max-wall", f"{max(1.0, seconds):.0f}"]
-    before = ensemble_made(folder)
+    limit = round(max(1.0, seconds)) if np.isfinite(seconds) else np.inf
+    if np.isfinite(limit):
+        call += ["--max-wall", str(limit)]
+    before, began = ensemble_made(folder), time.monotonic()
     code, said = Calls().run(call + ["--quiet"] * quiet, env=os.environ | ONE_THREAD)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
     sys.stderr.write(said)
-    stopped_by_limit(code, said)
+    stopped_by_limit(code, time.monotonic() - began, limit)
     return code != STOPPED
 
 

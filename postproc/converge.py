@@ -335,7 +335,7 @@ def main(argv=None):
     with locked(folder / "converge") as study.lock:
         rows = converge(study, a.vary, a.margin, a.tries)
         values = None  # of the case: not known where the budget was spent before its first run was through
-        if study.path("case", 0).exists():
+        if study.kept("case", 0, {}):
             with Run(study.path("case", 0)) as run:
                 values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,

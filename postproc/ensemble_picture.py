@@ -21,8 +21,6 @@ def headline(figure, e, subject):
     words = [f"{len(e.used)} members"]
     if doubtful:
         words.append(f"{doubtful} with warnings")
-    if unknown := len({e.name[m] for m in e.used} & set(e.without_folder)):
-        words.append(f"{unknown} without folders, whose doubts are not known")
     missing = e.n - len(e.used)
     if missing:
         words.append(f"{missing} failed, waiting or left out")

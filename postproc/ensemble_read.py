@@ -7,12 +7,11 @@
     time, ice = e.series(m)                        # of member m, all of its run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
-ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. It is read only under
-a sound seal, and a member whose files do not fit the record of its end (soundness.py) counts as waiting: it is in no
+ensemble.h5 holds all but collisions; those are in the members' folders. It is read only under a sound seal, and a member whose files do not fit the record of its end (soundness.py) counts as waiting: it is in no
 number until `bergtow ensemble` has run it again. Errors: RunError.
 """
 import json
-import re
+from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,9 +29,6 @@ MIN_INDEPENDENT, MIN_STRETCHES = 20, 10
 #: comes shortly before that is the largest of all
 LEAST_TOW = 150.0
 
-#: in a warning, from when on nothing tows
-LAST_PARTED = re.compile(r"the last line parted(?: at ([-+.e\d]+) s)?").search
-
 #: kinds of doubt about a member, and what each means
 DOUBTS = {
     "unconverged": "steps met the limit of work before the tolerance",
@@ -44,6 +40,12 @@ DOUBTS = {
     "stopped": "the run stopped early",
     "other": "a warning of another kind",
 }
+
+#: codes of warnings that tell of one of these; what a verdict rests on are reasons, and no warnings of their own
+TOLD = {"unconverged", "stalled", "not_steady", "too_short", "stopped"}
+
+#: /summary/window_verdict
+STEADY, NOT_STEADY, TOO_SHORT = 0, 1, 2
 
 #: doubts by which members may be left out: not that they met little ice, which would leave out the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
@@ -95,14 +97,22 @@ def _text(value):
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
+def _rows(f, group, columns):
+    """Rows of a table of ensemble.h5; a table without rows is not there."""
+    if group not in f:
+        return zip()
+    return zip(*(d.asstr()[()] if h5py.check_string_dtype(d.dtype) else d[()]
+                 for d in (f[f"{group}/{column}"] for column in columns.split())))
+
+
 def listed(names, most=8):
     """Names in a row, the first of many."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 class Ensemble:
-    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M];
-    unsound: {name: why}."""
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason, hole:
+    [M]; unsound: {name: why}."""
 
     def __init__(self, path):
         self.path = Path(path)
@@ -118,7 +128,7 @@ class Ensemble:
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})",
                            "run `bergtow ensemble` again: it makes the file anew") from None
-        self._dropped, self._events = {}, {}
+        self._dropped = {}
 
     def _read(self):
         fault = soundness.broken_seal(self.file, "ensemble 1") if soundness.available() else None
@@ -128,7 +138,14 @@ class Ensemble:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])
-            self.name, self.reason = (list(f[f"members/{key}"].asstr()[()]) for key in ("name", "reason"))
+            self.name, self.reason, self.hole = (list(f[f"members/{key}"].asstr()[()])
+                                                 for key in ("name", "reason", "hole"))
+            self._warnings, self._reasons = (self._notes(f, group) for group in ("warnings", "reasons"))
+            self._meanings = dict(zip(*(f[f"codes/{key}"].asstr()[()] for key in ("code", "meaning"))))
+            self._events = defaultdict(list)
+            for member, time, kind, subject, value in _rows(f, "events", "member time kind subject value"):
+                self._events[int(member) - 1].append(
+                    {"time_s": float(time), "kind": str(kind), "subject": int(subject), "value": float(value)})
             self.parameters, self.units = {}, {}
             for key, data in f["parameters"].items():
                 self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
@@ -150,19 +167,27 @@ class Ensemble:
         self.n = len(self.name)
         self.title = _text(self.attributes.get("title", b"")) or self.path.resolve().name
 
+    @staticmethod
+    def _notes(f, group):
+        """{row of the member: its warnings or reasons, as Run.warnings has them}"""
+        out = defaultdict(list)
+        for member, code, text, values in _rows(f, group, "member code text values"):
+            out[int(member) - 1].append({"code": code, "text": text, "values": json.loads(values) or {}})
+        return out
+
     def _unsound(self):
         """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
         out = {
             self.name[m]: self.reason[m].strip()
             for m in np.flatnonzero(self.status == WAITING)
-            if self.reason[m].startswith("its result")
+            if self.hole[m] in ("unsound", "unreadable")
         }
         for m in np.flatnonzero(self.status == FINISHED) if soundness.available() else ():
             why = soundness.fault_of_member(self.folder(m), self.name[m],
                                             self.study.encode()) if self.folder(m).is_dir() else None
             if why:
                 out[self.name[m]] = why
-                self.status[m], self.reason[m] = WAITING, f"its result is not sound: {why}"
+                self.status[m], self.reason[m], self.hole[m] = WAITING, f"its result is not sound: {why}", "unsound"
         return out
 
     def number(self, key, m):
@@ -226,7 +251,7 @@ class Ensemble:
 
     def adrift(self, m):
         """From when on nothing tows the body of a member, s; inf where something does to the end."""
-        return min((v["time_s"] for v in self.events(m) or [] if v["kind"] == "adrift"), default=np.inf)
+        return min((v["time_s"] for v in self.events(m) if v["kind"] == "adrift"), default=np.inf)
 
     def cut(self, m):
         """Does a member's tow end within the window that its summary names, or before it? Numbers of the summary over
@@ -256,57 +281,33 @@ class Ensemble:
                 out[m] = np.mean(x) if len(x) else np.nan
         return out
 
-    def _texts(self, m):
-        """summary.json of a member, {} where its folder is not there."""
-        try:
-            found = json.loads((self.folder(m) / "summary.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        return found if isinstance(found, dict) else {}
-
-    def texts(self, m):
-        """Warnings of a member in its own words; [] where its folder is not there."""
-        return [str(w) for w in self._texts(m).get("warnings") or []]
+    def warnings(self, m):
+        """[{"code", "text", "values"}] of a member: codes and values for programs, texts for readers."""
+        return self._warnings[int(m)]
 
     def why_unsteady(self, m):
-        """The first reason that a member gives for its verdict, without numbers, so that those of others are the
-        same; remedies, too, are left out."""
-        reason = str((self._texts(m).get("window") or {}).get("reason") or "its result does not say why")
-        return re.split(r"[,:;]|(?: (?:at|by|for|of|from))? [-(\d]", re.sub(r"^[\d.]+ % of ", "", reason))[0]
+        """What the first reason that a member gives for its verdict stands for: the same words for the same code."""
+        codes = [reason["code"] for reason in self._reasons[int(m)]]
+        return self._meanings.get(codes[0], codes[0]) if codes else "its result does not say why"
 
     def events(self, m):
-        """What happened in a member's run, as Run.events has it; None where its folder is not there. A result without
-        events may say in a warning that its last line parted; where that tells no time, it is -inf."""
-        if int(m) not in self._events:
-            try:
-                with Run(self.folder(m)) as run:
-                    self._events[int(m)] = run.events or [
-                        {"time_s": float(told[1] or -np.inf), "kind": kind, "subject": 0, "value": np.nan}
-                        for told in map(LAST_PARTED, self.texts(m)) if told for kind in ("line_broken", "adrift")]
-            except RunError:
-                self._events[int(m)] = None
+        """What happened in a member's run, as Run.events has it."""
         return self._events[int(m)]
 
     @cached_property
     def _doubts(self):
         out = {}
         for m in np.flatnonzero(self.status == FINISHED):
-            texts, found = self._texts(m), set()
-            window = texts.get("window") or {}
-            verdict, independent = window.get("verdict"), self.number("window_n_independent", m)
-            short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(
-                window.get("warning"))
+            codes = {warning["code"] for warning in self.warnings(m)}
+            verdict, independent = (self.number(key, m) for key in ("window_verdict", "window_n_independent"))
+            short = verdict == TOO_SHORT or (np.isnan(verdict) and not independent >= MIN_INDEPENDENT)
             few = self.number("window_n_contact_stretches", m) < MIN_STRETCHES
-            short = short and not few
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
-                "unsteady": verdict == "not steady", "short": short, "few": few, "stopped": bool(texts.get("stopped"))
+                "unsteady": verdict == NOT_STEADY, "short": short and not few, "few": few, "stopped": "stopped" in codes,
+                "other": bool(codes - TOLD)
             }
-            found |= {kind for kind, there in checks.items() if there}
-            warnings = len(texts.get("warnings") or [])
-            if warnings > sum(checks.values()):
-                found.add("other")
-            out[int(m)] = found
+            out[int(m)] = {kind for kind, there in checks.items() if there}
         return out
 
     def doubts(self, m):
@@ -332,7 +333,7 @@ class Ensemble:
 
     @cached_property
     def without_folder(self):
-        """Finished members whose folder is not there: their warnings are known by numbers alone."""
+        """Finished members whose folder is not there: their collisions are not known."""
         return [self.name[m] for m in np.flatnonzero(self.status == FINISHED) if not self.folder(m).is_dir()]
 
     @property

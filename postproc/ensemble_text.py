@@ -275,8 +275,7 @@ def report(s, markdown=False):
     if s["members_without_folder"]:
         lines.append(
             f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
-            f"no folder here ({listed(s['members_without_folder'])}): whether their windows are steady is not "
-            f"known, nor what they warn of but by numbers, their peaks not at all."
+            f"no folder here ({listed(s['members_without_folder'])}): the peaks of their collisions are not known."
         )
     heavy = [
         c["label"]

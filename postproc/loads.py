@@ -35,7 +35,7 @@ PROBABILITY = 0.05
 ALWAYS = ("tow_force", "ice_resistance")
 ROLE = "load"
 LOCAL = ("floe_force", "panel_load")  # on a part of the hull
-LINE = "with a tow line"              # what the tension of a branch applies to, alone or with more words
+LINE = ("line", "bridle")             # what the tension of a branch needs
 TENSION = "line_tension_"             # and the number of the branch
 PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
 TAILS = ("over_threshold", "block_maxima")
@@ -49,7 +49,7 @@ class Load:
     label: str
     units: str
     description: str
-    applies: str = ""     #: what a run must have for it, in the words of the registry
+    needs: str = ""       #: what a run must have for it, as the registry names it
     refused: str = ""     #: why there are no statistics of it
     conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
 
@@ -83,7 +83,7 @@ def of_run(run):
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
             out.append((Load(name, run.label(name), run.units(name), run.description(name),
-                             run.attribute(name, "applies")), run[name]))
+                             run.attribute(name, "needs")), run[name]))
     return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
 
 
@@ -105,19 +105,19 @@ def scaling(e, rows):
 def until(e, m, name):
     """Time up to which a load of a member is that of a tow, s: a tension until its branch parts, any other load until
     no branch is left."""
-    return min((v["time_s"] for v in e.events(m) or [] if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
+    return min((v["time_s"] for v in e.events(m) if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
                default=e.adrift(m))
 
 
 def tows_with(e, rows, *kinds):
     """How many of the members' tows had an event of these kinds."""
-    return sum(any(v["kind"] in kinds for v in e.events(m) or []) for m in rows)
+    return sum(any(v["kind"] in kinds for v in e.events(m)) for m in rows)
 
 
 def cut_off(e, rows, load):
     """Why a load has no tail where lines parted, "" where none did that matters to it. Tows that are excluded count:
     those that are left are the ones that the line survived."""
-    through_the_line, tows = load.name == ALWAYS[0] or load.applies.startswith(LINE), e.tows(rows)
+    through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
     return f"the line parted in {n} of {len(tows)} tows" if n else ""
 
@@ -195,7 +195,7 @@ def statistics(e, rows, options, gathered=None):
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
             fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
-            "label": load.label, "units": load.units, "description": load.description, "applies": load.applies,
+            "label": load.label, "units": load.units, "description": load.description, "needs": load.needs,
             "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),

@@ -165,8 +165,7 @@ def findings(run):
 
 def doubts(run):
     """The first two warnings of the summary, each in one line."""
-    warnings = run.summary.get("warnings")
-    warnings = [str(w) for w in warnings] if isinstance(warnings, list) else []
+    warnings = [warning["text"] for warning in run.warnings]
     lines = [style.plain(textwrap.shorten(f"warning: {w}", 145, placeholder=" ...")) for w in warnings[:2]]
     if len(warnings) > 2:
         lines[1] = (lines[1][:110].rsplit(" ", 1)[0] + " ..." if len(lines[1]) > 115 else lines[1]) \

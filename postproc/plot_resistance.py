@@ -73,7 +73,7 @@ def read(path):
                      steady=run.verdict[0] == "steady",
                      reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
-                     warnings=len(run.summary.get("warnings") or []),
+                     warnings=len(run.warnings),
                      estimates=run.estimates,
                      case=dict(run.case),
                      state=str(run.summary.get("state_hash") or ""),

@@ -200,13 +200,9 @@ def table(head, rows):
     return {"kind": "table", "head": head, "rows": rows}
 
 
-def reported(e, m):
-    """Warnings of a member in its own words, or why they are not known."""
-    try:
-        with Run(e.folder(m)) as run:
-            return [str(w) for w in run.summary.get("warnings") or []]
-    except RunError as error:
-        return [f"its folder cannot be read: {error.reason}"]
+def kind_of(warning):
+    """The code of a warning with the names among its values, of keys or series: its numbers make no other kind."""
+    return " ".join([warning["code"], *(v for v in warning["values"].values() if isinstance(v, str))])
 
 
 def members(e, s):
@@ -216,22 +212,23 @@ def members(e, s):
     for m in range(e.n):
         row = by_name.get(e.name[m])
         mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
+        warned = e.warnings(m) if e.status[m] == FINISHED else []
         out.append({
             "name": e.name[m], "condition": unbroken(labels[e.condition[m]]), "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "doubts": ", ".join(sorted(e.doubts(m))),
-            "reported": [scrubbed(w) for w in (reported(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
+            "kinds": {kind_of(w): scrubbed(w["text"]) for w in reversed(warned)},
+            "reported": [scrubbed(w) for w in [e.reason[m], *(w["text"] for w in warned)] if w]
         })
     return out
 
 
 def kinds_of_warnings(some):
-    """Warnings of members that differ in numbers alone as one, in the words of the first with the number of members:
-    rows of members()."""
+    """Warnings of one kind as one, in the words of the first with the number of members: rows of members()."""
     found = {}
     for row in some:
-        for text in row["reported"] if row["status"] == STATUS[FINISHED] else ():
-            found.setdefault(re.sub(r"[\d.]+", "#", text), [text, 0])[1] += 1
+        for kind, text in reversed(row["kinds"].items()):
+            found.setdefault(kind, [text, 0])[1] += 1
     return [f"{text} ({n} member{'s' if n > 1 else ''})" for text, n in found.values()]
 
 

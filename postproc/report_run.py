@@ -333,7 +333,6 @@ def breakable(text):
 def context(run, limit=LIMIT, compress=True, given=None):
     """Everything that page/run.html sets. Errors: RunError."""
     values = [replace(v, value=report_case.short(v.value)) for v in report_case.values(run)]
-    warnings = run.summary.get("warnings")
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
     block = report_case.title_block(run.case, run.attributes, given or {})
@@ -342,8 +341,8 @@ def context(run, limit=LIMIT, compress=True, given=None):
         "title": breakable(run.summary.get("title")
                            or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
         "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,
-        "warnings": [str(w)
-                     for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"],
+        "warnings": [warning["text"] for warning in run.warnings] if isinstance(run.summary.get("warnings"), list)
+        else ["summary.json holds no list of warnings"],
         "figures": figures(run), "forces": forces(run), "estimates": estimates(run),
         "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run),
         "events": happened, "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values),

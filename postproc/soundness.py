@@ -37,6 +37,10 @@ except ImportError:
     xxhash = None
 
 
+#: why not, and what to do
+MISSING = "this machine has neither libxxhash nor the Python package xxhash: install libxxhash0"
+
+
 def available():
     """Can digests be made on this machine?"""
     return _XXH3 is not None or xxhash is not None
@@ -93,6 +97,25 @@ def record(folder, name, study):
     return "\n".join(lines) + "\n"
 
 
+def stamp(folder):
+    """What tells that no file of a finished member has changed since it was looked at; None where one is missing."""
+    try:
+        some = [(folder / file).stat() for file in (*FILES, "finished")]
+    except OSError:
+        return None
+    return [(s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in some]
+
+
+def keep(folder, name, study):
+    """Write the record of a run that has just finished in a folder, under a temporary name first; none where digests
+    cannot be made. Errors: OSError, ValueError."""
+    if not available():
+        return
+    part = folder / "finished.tmp"
+    part.write_text(record(folder, name, study), encoding="utf-8")
+    part.replace(folder / "finished")
+
+
 def fault_of_member(folder, name, study):
     """Why the files of a finished member are not what it left, or None."""
     try:
@@ -110,5 +133,7 @@ def fault_of_member(folder, name, study):
     changed = [
         line.split(b":")[0].decode(errors="replace") for k, line in enumerate(want) if k >= len(have) or have[k] != line
     ]
+    if have[:1] == want[:1] and {"name", "study"} & set(changed):
+        return "its record `finished` is of another run"
     return (f"{' and '.join(changed[:3])} changed since it finished" if have[:1] == want[:1] and changed else
             "its record `finished` is damaged, or of an older version of the program")

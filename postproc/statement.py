@@ -122,20 +122,16 @@ def _numbers(e, name, rows):
 
 
 def unbounded(e, rows):
-    """Is there a member whose rigid floes jam? Of an earlier program, which had no number for it, its warning says."""
-    rows = np.asarray(rows)
-    known = _numbers(e, "domain_load_unbounded", rows)
-    return bool(np.any(known == 1)) or any(
-        text.startswith("ice.concentration:") for m in rows[np.isnan(known)] for text in e.texts(m))
+    """Is there a member whose rigid floes jam?"""
+    return bool(np.any(_numbers(e, "domain_load_unbounded", rows) == 1))
 
 
 def domain(e, rows):
-    """How much too narrow the domain is, "" where it is not; of an earlier program, how many members say so."""
+    """How much too narrow the domain is, "" where it is not."""
     widths, needed = (_numbers(e, f"domain_body_widths{name}", rows) for name in ("", "_needed"))
     if np.any(few := widths < needed):
         return f"{widths[few].min():.3g} body widths; {needed[few].max():.3g} are asked for"
-    some = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows[np.isnan(widths)])
-    return f"{some} of {len(rows)} members" if some else ""
+    return ""
 
 
 def _of_the_case(e, rows, case, tow):
@@ -275,7 +271,7 @@ def _of_the_line(e, rows, case, lines):
     """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
     a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
     out, tows = [], e.tows(rows)
-    broken = [v for m in tows for v in e.events(m) or [] if v["kind"] == loads.PARTED]
+    broken = [v for m in tows for v in e.events(m) if v["kind"] == loads.PARTED]
     if broken:
         parted, adrift = (loads.tows_with(e, tows, kind) for kind in (loads.PARTED, loads.ADRIFT))
         each = [f"branch {k} in {sum(v['subject'] == k for v in broken)}"
@@ -288,10 +284,6 @@ def _of_the_line(e, rows, case, lines):
                     ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
-    unknown = sum(e.events(m) is None for m in tows)
-    if unknown and case is not None and case.breaking_loads:
-        out.append(("whether the line parted is not known of members whose folders are not there",
-                    f"{unknown} of {len(tows)} members"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # of these it is said above
     for words, key, some in (("the design tension is", "design", lines),
                              ("the largest mean tension over one step, by which a line parts, is", "largest_step",
@@ -323,11 +315,11 @@ def statement(e, rows, c):
     case, found = case_of(e, towed), c["loads"]
     tow, lines = found.get("tow_force"), branches(e, towed, case, found)
     tensions = [(load["design"], load) for load in found.values()
-                if load["applies"].startswith(loads.LINE) and "value" in load["design"]]
+                if load["needs"] in loads.LINE and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     # a branch without a value may bear more than the one that has one
     if worst and any(load["largest"] > worst[0]["value"] for load in found.values()
-                     if load["applies"].startswith(loads.LINE) and "value" not in load["design"]):
+                     if load["needs"] in loads.LINE and "value" not in load["design"]):
         worst = None
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if not len(rows):
@@ -341,7 +333,7 @@ def statement(e, rows, c):
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
     for load in found.values() if len(rows) else ():
-        if load["applies"].startswith(loads.LINE):  # what is said of the sample of the tow force holds here, too
+        if load["needs"] in loads.LINE:  # what is said of the sample of the tow force holds here, too
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, case, lines) + warned

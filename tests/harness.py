@@ -172,6 +172,16 @@ def faulty(**what):
     return environment(OMP_NUM_THREADS=1, LD_PRELOAD=FAULT, **what)
 
 
+def texts(notes):
+    """The texts of warnings or reasons, [{"code", "text", "values"}]."""
+    return [note["text"] for note in notes]
+
+
+def reasons(summary):
+    """All reasons of a verdict in one text."""
+    return "; ".join(texts(summary["window"]["reasons"]))
+
+
 class Run:
     """The folder a run has left, and what the call printed."""
 
@@ -183,6 +193,14 @@ class Run:
     @property
     def hash(self):
         return self.summary["state_hash"]
+
+    @property
+    def warnings(self):
+        return texts(self.summary["warnings"])
+
+    @property
+    def reason(self):
+        return reasons(self.summary)
 
     def series(self, *names):
         with h5py.File(self.dir / "result.h5") as f:
@@ -203,7 +221,7 @@ def run(folder, case, *arguments, code=DONE, name="out", env=None, **more):
 
 
 def warned(r, pattern):
-    return [w for w in r.summary["warnings"] if re.search(pattern, w)]
+    return [w for w in r.warnings if re.search(pattern, w)]
 
 
 def datasets(path):

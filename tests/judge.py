@@ -18,7 +18,7 @@ def may_be_null(path, case, summary):
     window = summary["window"]["n_samples"]
     reference = value_of(case, "reference.mean_force")
     rules = (
-        (r"title|stopped|lead|reference|window\.(warning|reason)|.*\.source", True),
+        (r"title|stopped|lead|reference|.*\.source", True),
         (r"estimate_labels", not body),
         (r"start_peak_.*|.*\.start_peak_n", True),  # no step before the window
         (r"outlines\.origin_.*", True),

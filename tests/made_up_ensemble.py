@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """An ensemble's folder with numbers of the test's own, of the layout that src/run/ensemble_file.c writes."""
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -19,6 +20,16 @@ ESTIMATES = {
 }
 LABELS = {"lichey_hellmer": "Lichey-Hellmer", "marchenko_compaction": "compaction", "dilute_limit": "dilute limit"}
 TEXT = h5py.string_dtype()
+VERDICTS = ("steady", "not steady", "too short")
+#: (code, meaning) of every warning, as the table of the program has them
+CODES = re.findall(r'ROW\(\w+,\s*"(\w+)",\s*"[^"]*",\s*"([^"]*)"\)', (
+    Path(__file__).resolve().parents[1] / "src/case/warning.h").read_text(encoding="utf-8").replace("\\\n", ""))
+
+
+def note(code, text="", **values):
+    """A warning, or a reason of a verdict."""
+    assert code in dict(CODES), code
+    return {"code": code, "text": text or f"the text of {code}", "values": values}
 
 
 def described(name):
@@ -32,11 +43,11 @@ def described(name):
 def member(series, parameters, condition, **changes):
     """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N); more: further
     series of result.h5, attributes: {name: attributes} of them; case: its text; state: hash
-    of its end, None for one of its own."""
+    of its end, None for one of its own; warnings, reasons: of note()."""
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
         "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
-        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {},
+        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "reasons": [], "more": {},
         "attributes": {}, "case": None, "state": None
     } | changes
 
@@ -71,7 +82,7 @@ def write_member(folder, m):
     """summary.json and a result.h5 with the collisions."""
     folder.mkdir(parents=True, exist_ok=True)
     nested = numbers(m)
-    nested["window"]["warning"] = m["window_warning"]
+    nested["window"]["reasons"] = m["reasons"]
     nested["estimates"] |= {
         "curves": {
             "concentration": [0.0, 0.5, 1.0], "valid_range": {k: [0.0, 1.0]
@@ -96,6 +107,29 @@ def write_member(folder, m):
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
         f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
         f["impacts"].attrs["conversion"] = m["conversion"]
+
+
+def verdict(m):
+    """The number of a verdict."""
+    name = m.get("window", {}).get("verdict")
+    return float(VERDICTS.index(name)) if name else np.nan
+
+
+def table(f, group, columns, rows):
+    """A group with a column of each name; none without rows."""
+    for name, column in zip(columns.split(), zip(*rows)):
+        f.create_dataset(f"{group}/{name}", data=list(column), dtype=TEXT if isinstance(column[0], str) else None)
+
+
+def notes_of(f, members, done):
+    """Warnings, reasons and events of the members that finished."""
+    some = [(i + 1, m) for i, (m, ok) in enumerate(zip(members, done)) if ok]
+    for group in ("warnings", "reasons"):
+        table(f, group, "member code text values",
+              [(i, w["code"], w["text"], json.dumps(w["values"])) for i, m in some for w in m[group]])
+    table(f, "events", "member time kind subject value",
+          [(i, e["time_s"], e["kind"], e["subject"], e["value"]) for i, m in some for e in numbers(m)["events"]])
+    table(f, "codes", "code meaning", CODES)
 
 
 def seal(path, kind="ensemble 1"):
@@ -126,8 +160,10 @@ def write(folder, members, title="made up", sampling="grid"):
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])
         states = [m["state"] or f"{i}" for i, (m, *_) in enumerate(rows)]
+        holes = {FAILED: "failed", WAITING: "died", FINISHED: ""}
         for key, texts in (("name", [name for *_, name in rows]), ("state_hash", states),
-                           ("reason", [m["reason"] for m in members])):
+                           ("reason", [m["reason"] for m in members]),
+                           ("hole", [holes[m["status"]] * bool(m["reason"]) for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
         for group in ("parameters", "summary"):
             f.create_group(group)
@@ -137,7 +173,9 @@ def write(folder, members, title="made up", sampling="grid"):
                                     data=values,
                                     dtype=TEXT if isinstance(values[0], str) else float)
             data.attrs["units"], data.attrs["key"] = UNITS.get(key, "1"), key
-        summaries = [dict(flat(numbers(m))) if ok else {} for m, ok in zip(members, done)]
+        notes_of(f, members, done)
+        summaries = [dict(flat(numbers(m))) | {"window_verdict": verdict(m)} if ok else {}
+                     for m, ok in zip(members, done)]
         for key in dict.fromkeys(k for s in summaries for k in s):
             f[f"summary/{key}"] = np.array([s.get(key, np.nan) for s in summaries])
             for name in (n for n in members[0]["estimates"] if key.startswith(f"estimates_{n}_")):

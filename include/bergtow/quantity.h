@@ -43,7 +43,8 @@ typedef enum {
 } bt_role;
 
 extern const char *const bt_keep_names[BT_KEEP_KINDS];       ///< "last", "mean", "max", "sum"
-extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line"
+extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line", for readers
+extern const char *const bt_applies_codes[BT_APPLIES_KINDS]; ///< "line", for programs
 extern const char *const bt_role_names[BT_ROLE_KINDS];       ///< "balance"; "" for none
 
 typedef struct bt_quantity {

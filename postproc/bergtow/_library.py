@@ -46,7 +46,7 @@ class Options(ctypes.Structure):
 
 class Errors(ctypes.Structure):
     """bt_errors"""
-    _fields_ = [("text", POINTER(c_char_p)), ("n", c_size_t), ("cap", c_size_t)]
+    _fields_ = [("text", POINTER(c_char_p)), ("n", c_size_t), ("cap", c_size_t), ("note", c_void_p)]
 
 
 class Applied(ctypes.Structure):

@@ -67,7 +67,7 @@ def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         text = f"{value:.4g}" if isinstance(value, float) else str(value)
         yield html.escape(name), html.escape(text + (f" ± {error:.2g}" if error else ""))
     for warning in summary.get("warnings", []):
-        yield "warning", html.escape(str(warning))
+        yield "warning", html.escape(str(warning["text"]))
 
 
 def _imported(name: str) -> Any:

@@ -9,6 +9,7 @@
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/cost.h"
+#include "case/warning.h"
 
 static void write_domain(bt_json *j, const bt_case *c, const bt_check_ice *n)
 {
@@ -66,9 +67,7 @@ void bt_check_print_json(const char *path, const bt_case *c, const bt_comm *comm
     bt_json_open(&j, NULL, '{');
     bt_json_string(&j, "case", path);
     bt_json_string(&j, "title", c->run.title);
-    bt_json_open(&j, "warnings", '[');
-    for (size_t i = 0; i < warnings->n; i++) bt_json_string(&j, NULL, warnings->text[i]);
-    bt_json_close(&j, ']');
+    bt_warnings_json(&j, "warnings", warnings);
     write_domain(&j, c, n);
     write_ice(&j, n);
     write_run(&j, c, run);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the check of a case and that of a study share: refusals, warnings and the ice that a run would begin with.
 #include "app/cmd_check.h"
+#include "case/warning.h"
 
 #include <math.h>
 
@@ -96,15 +97,17 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
 {
     const bt_check_step s = bt_check_step_of(c, n);
     if (!s.contact)
-        bt_errors_add(warnings, "run.dt: %g s is longer than a collision lasts %s; take at most %g s", c->run.dt,
+        bt_warn(warnings, BT_WARN_LONG_STEP,
+                      "run.dt: %g s is longer than a collision lasts %s; take at most %g s",
+                      c->run.dt,
                       c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", s.longest);
     if (!s.floes)
-        bt_errors_add(
-            warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s",
+        bt_warn(warnings, BT_WARN_FAST_FLOES,
+            "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s",
             c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / s.speed);
     const double reference = bt_case_reference_speed(c);
     if (n->count >= 1 && s.speed > SLOW * reference)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_LOW_REFERENCE_SPEED,
                       "solver.reference_speed: %.3g m/s, and the ice comes at up to %.3g m/s: contacts are solved more "
                       "strictly than a result needs, and slower hits count as collisions; set it to that",
                       reference, s.speed);
@@ -122,7 +125,7 @@ static void warn_of_track(const bt_case *c, const bt_field *f, const bt_check_ic
         bt_summary_window_warn_laps(warnings, bt_track_laps(c, &t));
         const double fall = bt_track_fall(c, &t);
         if (fall > BT_WINDOW_STRIDE * n->size)
-            bt_errors_add(warnings,
+            bt_warn(warnings, BT_WARN_ICE_OVERTAKES,
                           "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a "
                           "moving window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
                           fall);

@@ -30,14 +30,14 @@ enum {
 // Of the first member of a condition.
 typedef struct {
     double floes, steps, seconds, memory, disk; // number, number, s of one core, B, B
-    bool step_good;
-    int warnings;
+    bool step_good, warned;
     bool fixed; // the ice does not depend on the seed
 } numbers;
 
 typedef struct {
     char *text;
-    int64_t first, count; // conditions
+    const char *code;     // of a warning
+    int64_t first, last, count; // conditions
 } fault;
 
 typedef struct {
@@ -63,18 +63,25 @@ bool bt_check_is_study(const char *path)
     return found;
 }
 
-// --- faults: what is wrong with many conditions is said once ---------------------------------------------------------
+// --- faults and warnings: what is wrong with many conditions is said once --------------------------------------------
+
+/// Of warnings of one code, which differ in numbers, the first stands for all.
+static bool is_same(const fault *a, const char *text, const char *code)
+{
+    return a->code && code ? !strcmp(a->code, code) : !strcmp(a->text, text);
+}
 
 static void take_faults(faults *f, int64_t condition, bt_errors *err)
 {
     for (size_t i = 0; i < err->n; i++) {
         size_t k = 0;
-        while (k < f->n && strcmp(f->list[k].text, err->text[i])) k++;
+        while (k < f->n && !is_same(&f->list[k], err->text[i], err->note[i].code)) k++;
         if (k == f->n) {
             f->list = bt_realloc(f->list, f->n + 1, sizeof *f->list);
-            f->list[f->n++] = (fault){bt_text_copy(err->text[i]), condition, 0};
+            f->list[f->n++] = (fault){bt_text_copy(err->text[i]), err->note[i].code, condition, -1, 0};
         }
-        f->list[k].count++;
+        f->list[k].count += f->list[k].last != condition;
+        f->list[k].last = condition;
     }
     bt_errors_free(err);
 }
@@ -103,7 +110,7 @@ static void tell_faults(faults *f, const bt_study *s, bt_errors *err)
 static bt_status worse(bt_status a, bt_status b) { return a > b ? a : b; }
 
 /// Case and ice of a condition, as `check` has them of a case.
-static bt_status check_condition(const bt_study *s, int64_t condition, numbers *x, bt_errors *err)
+static bt_status check_condition(const bt_study *s, int64_t condition, numbers *x, bt_errors *warnings, bt_errors *err)
 {
     bt_member m;
     bt_case c;
@@ -118,17 +125,15 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
     if (status == BT_OK) {
         const bt_check_step step = bt_check_step_of(&c, &n);
         const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
-        bt_errors warnings = {0};
-        bt_check_warn(&c, &f, &n, &warnings);
+        bt_check_warn(&c, &f, &n, warnings);
         *x = (numbers){n.count,
                        (double)bt_case_steps(&c),
                        bt_check_seconds(&c, &n),
                        bt_cost_memory(&c, n.count, ranks.size, ranks.size),
                        bt_cost_member(&c, &disk),
                        step.contact && step.floes,
-                       (int)warnings.n,
+                       warnings->n > 0,
                        !bt_case_ice_is_random(&c)};
-        bt_errors_free(&warnings);
     }
     bt_field_free(&f);
     bt_case_free(&c);
@@ -137,7 +142,7 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
 }
 
 /// x: [n_conditions].
-static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *err)
+static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *warnings, bt_errors *err)
 {
     bt_case c;
     bt_status status = bt_study_base_case(s, &c, err); // what is wrong without any condition
@@ -147,14 +152,16 @@ static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *err)
                       s->path, s->base_name);
         return status;
     }
-    faults f = {0};
+    faults f = {0}, w = {0};
     int64_t k = 0;
     for (; k < s->n_conditions && f.n < BT_MOST_COMPLAINTS; k++) {
-        bt_errors here = {0};
-        status = worse(status, check_condition(s, k, &x[k], &here));
+        bt_errors here = {0}, warned = {0};
+        status = worse(status, check_condition(s, k, &x[k], &warned, &here));
         take_faults(&f, k, &here);
+        take_faults(&w, k, &warned);
     }
     tell_faults(&f, s, err);
+    tell_faults(&w, s, warnings);
     if (status != BT_OK && k < s->n_conditions)
         bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first",
                       s->path, k + 1, BT_MOST_COMPLAINTS);
@@ -268,7 +275,7 @@ static void print_range(const bt_study *s, const numbers *x)
            duration(hi.seconds, b));
     if (large)
         printf("time step            TOO LARGE in %" PRId64
-               " conditions; `bergtow check` of the base with --set says why\n",
+               " conditions; warnings below say why\n",
                large);
     else printf("time step            ok\n");
 }
@@ -294,7 +301,7 @@ static void print_work(const bt_study *s, double memory, double disk, double sec
                duration(seconds / (double)(groups * s->ranks), text), groups * s->ranks);
 }
 
-static void print_study(const bt_study *s, const numbers *x, int ranks)
+static void print_study(const bt_study *s, const numbers *x, const bt_errors *warnings, int ranks)
 {
     double seconds = 0, memory = 0, disk = 0;
     int64_t warned = 0, fixed = 0;
@@ -302,7 +309,7 @@ static void print_study(const bt_study *s, const numbers *x, int ranks)
         fixed += x[k].fixed && s->repeats > 1;
         seconds += x[k].seconds * (double)s->repeats;
         disk += x[k].disk * (double)s->repeats;
-        warned += x[k].warnings > 0;
+        warned += x[k].warned;
         memory = bt_max(memory, x[k].memory);
     }
     char verdict_of_all[96] = "valid";
@@ -326,7 +333,8 @@ static void print_study(const bt_study *s, const numbers *x, int ranks)
     if (s->n_conditions <= MOST_ROWS) print_table(s, x);
     else print_range(s, x);
     print_work(s, memory, disk, seconds, ranks);
-    if (warned) printf("%s: %s; `bergtow check` of the base with --set says which\n", s->path, verdict_of_all);
+    for (size_t i = 0; i < warnings->n; i++) printf("warning              %s\n", warnings->text[i]);
+    if (warned) printf("%s: %s\n", s->path, verdict_of_all);
 }
 
 bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
@@ -340,8 +348,10 @@ bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
     if (err->n > before) status = BT_ERR_CASE;
     if (status == BT_OK) {
         numbers *x = bt_alloc((size_t)s.n_conditions, sizeof *x);
-        status = check_conditions(&s, x, err);
-        if (status == BT_OK) print_study(&s, x, ranks);
+        bt_errors warnings = {0};
+        status = check_conditions(&s, x, &warnings, err);
+        if (status == BT_OK) print_study(&s, x, &warnings, ranks);
+        bt_errors_free(&warnings);
         free(x);
     }
     bt_study_free(&s);

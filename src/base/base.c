@@ -113,18 +113,25 @@ char *bt_text_of(const char *fmt, ...)
 
 void bt_errors_add(bt_errors *e, const char *fmt, ...)
 {
+    va_list ap;
+    va_start(ap, fmt);
+    bt_errors_add_list(e, fmt, ap);
+    va_end(ap);
+}
+
+void bt_errors_add_list(bt_errors *e, const char *fmt, va_list args)
+{
     if (e->n == e->cap) {
         e->cap = e->cap ? 2 * e->cap : 8;
         e->text = bt_realloc(e->text, e->cap, sizeof *e->text);
+        e->note = bt_realloc(e->note, e->cap, sizeof *e->note);
     }
-    va_list ap;
-    va_start(ap, fmt);
-    char *text = text_of(fmt, ap);
-    va_end(ap);
+    char *text = text_of(fmt, args);
     // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a
     // question mark.
     for (char *s = text; *s; s++)
         if ((unsigned char)*s < 0x20 || *s == 0x7F) *s = '?';
+    e->note[e->n] = (bt_note){0};
     e->text[e->n++] = text;
 }
 
@@ -135,14 +142,22 @@ void bt_errors_print(const bt_errors *e)
 
 void bt_errors_move(bt_errors *to, bt_errors *from)
 {
-    for (size_t i = 0; i < from->n; i++) bt_errors_add(to, "%s", from->text[i]);
+    for (size_t i = 0; i < from->n; i++) {
+        bt_errors_add(to, "%s", from->text[i]);
+        to->note[to->n - 1] = from->note[i];
+        from->note[i] = (bt_note){0};
+    }
     bt_errors_free(from);
 }
 
 void bt_errors_free(bt_errors *e)
 {
-    for (size_t i = 0; i < e->n; i++) free(e->text[i]);
+    for (size_t i = 0; i < e->n; i++) {
+        free(e->text[i]);
+        free(e->note[i].values);
+    }
     free(e->text);
+    free(e->note);
     *e = (bt_errors){0};
 }
 

@@ -76,8 +76,8 @@ static void indent(bt_json *j)
 
 static void member(bt_json *j, const char *key)
 {
-    if (j->started) puts_(j, ",");
-    if (j->depth) indent(j);
+    if (j->started) puts_(j, j->flat ? ", " : ",");
+    if (j->depth && !j->flat) indent(j);
     j->started = true;
     if (!key) return;
     put_string(j, key);
@@ -95,10 +95,10 @@ void bt_json_open(bt_json *j, const char *key, char bracket)
 void bt_json_close(bt_json *j, char bracket)
 {
     j->depth--;
-    if (j->started) indent(j);
+    if (j->started && !j->flat) indent(j);
     put(j, &bracket, 1);
     j->started = true;
-    if (j->depth == 0) puts_(j, "\n");
+    if (j->depth == 0 && !j->flat) puts_(j, "\n");
 }
 
 void bt_json_number(bt_json *j, const char *key, double value)
@@ -148,6 +148,12 @@ void bt_json_string(bt_json *j, const char *key, const char *value)
     member(j, key);
     if (value) put_string(j, value);
     else puts_(j, "null");
+}
+
+void bt_json_raw(bt_json *j, const char *key, const char *json)
+{
+    member(j, key);
+    puts_(j, json);
 }
 
 void bt_json_free(bt_json *j)

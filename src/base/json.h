@@ -10,6 +10,7 @@ typedef struct bt_json {
     size_t n, cap;
     int depth;
     bool started; ///< the open object or array has a member
+    bool flat;    ///< members follow in one line
 } bt_json;
 
 /// key: NULL inside an array and at the top. bracket: '{' or '['.
@@ -22,6 +23,7 @@ void bt_json_bool(bt_json *j, const char *key, bool value);
 void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *values);
 /// value: NULL gives null; bytes that are not UTF-8 become U+FFFD.
 void bt_json_string(bt_json *j, const char *key, const char *value);
+void bt_json_raw(bt_json *j, const char *key, const char *json); ///< a value that is JSON already
 void bt_json_free(bt_json *j);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Width of the domain against body, floes and arches, and what bounds their load; the rules are in arch.h.
 #include "case/arch.h"
+#include "case/warning.h"
 
 #include <math.h>
 
@@ -96,24 +97,24 @@ const char *bt_arch_floes(const bt_arch *a) { return a->rigid ? "rigid floes" : 
 void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
 {
     if (a->possible)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_NARROW_DOMAIN,
                       "%s: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
                       a->key, a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->needed);
     if (a->water > 0)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_ICE_STRIP,
                       "%s: %.4g m of open water beside the tow, where the ice ends before the domain does: floes are "
                       "pushed out into it, and the resistance is that of a strip of ice; leave both keys out to fill "
                       "the domain, unless that is meant",
                       a->region, a->water);
     if (a->gap > 0)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_ICE_GAP,
                       "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and is repeated so: "
                       "the body comes into open water again and again; leave both keys out",
                       a->gap);
     if (a->unbounded)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_LOAD_UNBOUNDED,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "
                       "load has no upper bound; read it as a property of this model, or let floes raft "
                       "(ice.rafting.kappa, 10 to 34) or crush (ice.crushing.pressure)",

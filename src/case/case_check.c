@@ -4,6 +4,7 @@
 // A check names the keys it looks at; when one of them was refused already, it is left out: its message would be about
 // the default that stands in for the refused value.
 #include "case/case_check.h"
+#include "case/warning.h"
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
@@ -597,12 +598,12 @@ void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
     const double ratio =
         bt_case_body_mass(c) / (c->water.density * bt_shape_extent(n, v).area * c->body.draft);
     if (!(ratio >= 1 / BT_ODD_MASS && ratio <= BT_ODD_MASS))
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_ODD_MASS,
                       "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "
                       "unit wrong?",
                       c->body.mass > 0 ? "body.mass" : "body.density", ratio);
     if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_LONG_IMPACT,
                       "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "
                       "peaks of collisions are as much too low as that is too long: is a unit wrong?",
                       c->impact.duration, c->impact.duration / c->run.dt);

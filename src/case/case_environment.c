@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What surrounds the body: tables of current and wind that a case names, the lead ahead, and checks of their keys.
 #include "case/case_check.h"
+#include "case/warning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -123,7 +124,7 @@ static void warn_of_table(const bt_case *c, const char *key, const bt_table *t, 
             memcmp(&t->row[3 * i + 1], &t->row[3 * i - 2], 2 * sizeof *t->row) != 0 && n++ == 0)
             first = i;
     if (n > 0)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_TABLE_ROWS,
                       "%s: rows that change the velocity within less than a time step of %g s: %lld, the first at %g "
                       "s: a step takes the velocity of its middle, and what changes between is not felt; lower run.dt, "
                       "or give means over a step or longer",
@@ -143,13 +144,13 @@ void bt_case_warn_lead(const bt_case *c, double x, double y, bt_errors *warnings
     const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     const double aside = c->tow.n_waypoints > 0 ? bt_hypot(x, y) : fabs(y * ux - x * uy), cut = bt_case_tow_cut(c);
     if (cut > 0.5 * c->lead.width)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_LEAD_CORNERS,
                       "lead.width: on its line the body cuts the corners of the way by up to %.3g m, more than half "
                       "the width of the lead, %g m, which follows the way-points: it leaves the lead there; take a "
                       "wider lead, a shorter line, or move the corner",
                       cut, c->lead.width);
     if (!(aside > 0.5 * c->lead.width)) return;
-    bt_errors_add(warnings,
+    bt_warn(warnings, BT_WARN_LEAD_DRIFT,
                   "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width "
                   "of the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",
                   aside, c->tow.n_waypoints > 0 ? "against" : "across", c->lead.width);

@@ -5,6 +5,7 @@
 // inherited, from a base or from the case that a study or --set changes: then the run says that it was not used. A
 // default says nothing, nor does a file that has every key, as a resolved case and a scaled twin have: it says what is.
 #include "case/case_idle.h"
+#include "case/warning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -172,7 +173,7 @@ typedef struct warning {
 
 static void put(warning *w)
 {
-    if (*w->names) bt_errors_add(w->warnings, "%s: no effect %s", w->names, w->why);
+    if (*w->names) bt_warn(w->warnings, BT_WARN_IDLE, "%s: no effect %s", w->names, w->why);
     *w->names = 0;
 }
 

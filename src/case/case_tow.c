@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/path.h"
+#include "case/warning.h"
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
@@ -268,7 +269,7 @@ static void warn_of_jerks(const bt_case *c, bt_errors *warnings)
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++)
         if (p[2 * i + 3] != p[2 * i + 1] && p[2 * i + 2] - p[2 * i] < c->run.dt)
-            bt_errors_add(warnings,
+            bt_warn(warnings, BT_WARN_SPEED_JUMP,
                           "tow.programme: from %g to %g m/s in less than a step: the tow force is then mass times the "
                           "change over run.dt, as large as that is short, and its peak says nothing; let the change "
                           "take several steps",
@@ -278,7 +279,7 @@ static void warn_of_jerks(const bt_case *c, bt_errors *warnings)
     if (c->tow.n_waypoints == 0 || c->tow.turn_radius > 0 || !bt_case_tow_path(c, &path, why)) return;
     for (int k = 0; k < path.n_marks; k++)
         if (bt_case_tow_turn(c, k) > BT_TURN && path.mark[k] < bt_case_tow_distance(c, c->run.duration)) {
-            bt_errors_add(warnings,
+            bt_warn(warnings, BT_WARN_TURN_JUMP,
                           "tow.turn_radius: 0 m, and the body turns at way-point %d within one step: the tow force is "
                           "then mass times the change of velocity over run.dt, as large as that is short, and its peak "
                           "says nothing; give a radius",
@@ -310,7 +311,7 @@ static void warn_of_overtaking(const bt_case *c, bt_errors *warnings)
 {
     const double along = has_line(c) ? following(c) : 0;
     if (along > c->tow.speed && c->tow.speed > 0)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_CURRENT_OVERTAKES,
                       "water.%s: up to %.3g m/s along the tow, which is to make %.3g m/s: the current carries the body "
                       "past its towing end, and nothing in the model fends it off; tow faster than the current, or "
                       "against it",
@@ -325,12 +326,12 @@ void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
     if (bt_case_start_is_slow(c)) return;
     const double period = bt_case_line_period(c), ramp = bt_case_steepest_ramp(c);
     if (c->tow.n_programme > 0)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_STEEP_PROGRAMME,
                       "tow.programme: a rise as steep as from 0 to %.4g m/s in %.4g s is short for a body that swings "
                       "on its line in %.3g s: it jerks the line, which swings on; take at least %.3g s for that",
                       c->tow.speed, ramp, period, BT_RAMP_PERIODS * period);
     else
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_SHORT_RAMP,
                       "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the "
                       "line, and it swings on; leave tow.ramp out, or take at least %.3g s",
                       ramp, period, BT_RAMP_PERIODS * period);

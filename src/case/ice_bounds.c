@@ -5,6 +5,7 @@
 // range of a double, so that no input makes an infinity or a NaN out of finite numbers. Rejected: bounds of their own
 // in each reader, which had let an HDF5 file have floes of 800 m where a case file may have 100 m.
 #include "case/ice_bounds.h"
+#include "case/warning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -154,7 +155,7 @@ void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings)
 {
     const double closed = bt_ice_closed(c, area);
     if (!(closed >= c->estimate.phi_j)) return;
-    bt_errors_add(warnings,
+    bt_warn(warnings, BT_WARN_CLOSED_ICE,
                   "domain.%s_closing: the walls bring the ice to a concentration of %.3g by the end of the run, packed "
                   "from %g on (estimate.phi_j): rigid floes then bear any load; end the run before, or set "
                   "ice.crushing.pressure or ice.rafting.kappa",
@@ -170,7 +171,7 @@ void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings)
         // of a row of floes from wall to wall each contact takes an equal share, where they are locked
         const double share = 2 * closing / (across + 1);
         if (!(closing > 0 && size > 0 && share < 2 * accepted)) continue;
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_SLOW_CLOSING,
                       "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, "
                       "is %.2g m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls "
                       "may bear no load, without a word; set solver.tolerance: %.1g",
@@ -185,7 +186,7 @@ void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *war
 {
     const bool deep = c->body.shape != BT_BODY_ABSENT && thickness > c->body.draft;
     if (!(thickness > THICK) && !(thickness > STOUT * size) && !deep) return;
-    bt_errors_add(warnings,
+    bt_warn(warnings, BT_WARN_THICK_ICE,
                   "the ice is %.3g m thick in the mean, %s; check that it is in metres (ice.thickness, or thickness in "
                   "the file)",
                   thickness,

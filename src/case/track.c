@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Speed, wake and end of a track; the rules are in case/track.h.
 #include "case/track.h"
+#include "case/warning.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -123,12 +124,12 @@ void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
     bool gap = false;
     const int64_t wake = first_in_wake(t, period, size), last = last_in_ice(c, t, size, &gap);
     if (wake < t->n)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_OWN_WAKE,
                       "from %.4g s on the body meets ice that it has opened before, a period of the domain on: take a "
                       "larger domain, set domain.ends: moving, or end the run before",
                       t->time[wake]);
     if (last < t->n)
-        bt_errors_add(warnings,
+        bt_warn(warnings, BT_WARN_LEAVES_ICE,
                       "the body leaves the ice at %.4g s, %s, or end the run before", t->time[last],
                       gap ? "and comes into open water, for it does not fill the domain: leave ice.x_min, ice.x_max, "
                             "ice.y_min and ice.y_max out"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Bounds of the contacts from their geometry, and what crushing leaves behind; equations in contact/crush.h.
 #include "contact/crush.h"
+#include "case/warning.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -65,13 +66,14 @@ static char *result(const bt_case *c, const bt_total_value *total, double ice_ar
         total[WORK].real, (long long)total[STEPS].whole, total[MOST].real, total[DEPTH].real);
 }
 
-static char *doubt(const bt_total_value *total, double size)
+static void warn(const bt_total_value *total, double size, bt_errors *warnings)
 {
     const double depth = total[DEPTH].real;
-    if (depth <= MOST_DEPTH * size) return NULL;
-    return bt_text_of("floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses "
-                      "stay as they were, which is no model of that",
-                      depth, 100 * depth / size);
+    if (depth <= MOST_DEPTH * size) return;
+    bt_warn(warnings, BT_WARN_CRUSHED,
+            "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they "
+            "were, which is no model of that",
+            depth, 100 * depth / size);
 }
 
 /// Thickness that is crushed when a and b are pressed together, m; 0 = neither is ice.
@@ -226,4 +228,4 @@ const bt_law bt_crush_law = {.name = "crushing",
                              .count = count,
                              .check = check,
                              .result = result,
-                             .doubt = doubt};
+                             .warn = warn};

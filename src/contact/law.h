@@ -131,8 +131,8 @@ typedef struct bt_law {
     char *(*check)(const bt_case *c, double thickness, double size);
     /// A line of the table at the end of a run: total [n_totals], area of all ice, m².
     char *(*result)(const bt_case *c, const bt_total_value *total, double ice_area);
-    /// A doubt about these numbers, in a sentence; size: mean of the floes, m.
-    char *(*doubt)(const bt_total_value *total, double size);
+    /// A doubt about these numbers; size: mean of the floes, m.
+    void (*warn)(const bt_total_value *total, double size, bt_errors *warnings);
 } bt_law;
 
 #define BT_LAW_DECLARED(name, law) extern const bt_law law;

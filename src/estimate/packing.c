@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Time at which the packed ice reaches the wall ahead; the balance is in packing.h.
 #include "estimate/packing.h"
+#include "case/warning.h"
 
 #include <math.h>
 
@@ -57,17 +58,17 @@ void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings)
 {
     if (!(end > BT_PACKING_EARLY * p->time)) return;
     if (p->time == 0)
-        bt_errors_add(warnings,
-                      "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the "
-                      "start: the resistance is also a property of "
-                      "the domain's length; take domain.ends: open, periodic or moving where no wall is meant",
-                      p->packed);
+        bt_warn(warnings, BT_WARN_PACKED_AT_START,
+                "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the "
+                "start: the resistance is also a property of "
+                "the domain's length; take domain.ends: open, periodic or moving where no wall is meant",
+                p->packed);
     else
-        bt_errors_add(warnings,
-                      "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest "
-                      "(estimate: the ice of the body's track, packed to "
-                      "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a "
-                      "property of the domain's length; end the run before, "
-                      "or take a longer domain",
-                      p->time, BT_PACKING_EARLY * p->time, p->packed, end);
+        bt_warn(warnings, BT_WARN_PACKED,
+                "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest "
+                "(estimate: the ice of the body's track, packed to "
+                "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a "
+                "property of the domain's length; end the run before, "
+                "or take a longer domain",
+                p->time, BT_PACKING_EARLY * p->time, p->packed, end);
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bergtow/field.h"
+#include "case/warning.h"
 #include "case/ice_bounds.h"
 #include "case/case_idle.h"
 #include "field/field_admit.h"
@@ -49,15 +50,15 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 static void warn_of_region(const bt_outline_counts *o, bt_errors *warnings)
 {
     if (o->outside)
-        bt_errors_add(warnings,
-                      "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they are there, and the "
-                      "concentration, which refers to that region, leaves out %.4g m2 of ice outside it",
-                      (long long)o->outside, (long long)o->read, o->outside_area);
+        bt_warn(warnings, BT_WARN_ICE_OUTSIDE,
+                "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they are there, and the "
+                "concentration, which refers to that region, leaves out %.4g m2 of ice outside it",
+                (long long)o->outside, (long long)o->read, o->outside_area);
     if (o->own_area > 0 && o->region_area > 0 && fabs(o->own_area / o->region_area - 1) > 0.01)
-        bt_errors_add(warnings,
-                      "ice.field: the concentration of the file refers to an ice region of %.6g m2, and the domain "
-                      "less the body has %.6g m2: it is not that of the domain",
-                      o->own_area, o->region_area);
+        bt_warn(warnings, BT_WARN_OTHER_REGION,
+                "ice.field: the concentration of the file refers to an ice region of %.6g m2, and the domain "
+                "less the body has %.6g m2: it is not that of the domain",
+                o->own_area, o->region_area);
 }
 
 static void warn_of_latitude(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
@@ -65,19 +66,20 @@ static void warn_of_latitude(const bt_outline_counts *o, const bt_case *c, bt_er
     if (!o->read || !isfinite(o->lat) || c->domain.frame != BT_FRAME_GEOGRAPHIC) return; // a basin lies nowhere
     const double place = o->lat * 180 / BT_PI, lon = o->lon * 180 / BT_PI;
     if (isnan(c->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
-        bt_errors_add(warnings,
-                      "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they are to lie in "
-                      "the north, latitude comes first in the file: write [longitude, latitude]",
-                      place, lon);
+        bt_warn(warnings, BT_WARN_LATITUDE_FIRST,
+                "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they are to lie in "
+                "the north, latitude comes first in the file: write [longitude, latitude]",
+                place, lon);
     const double given = c->water.latitude * 180 / BT_PI;
     if (given == 0 && fabs(place) > 1)
-        bt_errors_add(warnings,
-                      "the outlines lie at latitude %.4g deg, and without water.latitude there is no Coriolis force; "
-                      "set it to %.4g deg",
-                      place, place);
+        bt_warn(warnings, BT_WARN_NO_LATITUDE,
+                "the outlines lie at latitude %.4g deg, and without water.latitude there is no Coriolis force; "
+                "set it to %.4g deg",
+                place, place);
     else if (fabs(place - given) > 1)
-        bt_errors_add(warnings, "the outlines lie at latitude %.4g deg, and water.latitude is %.4g deg; correct one",
-                      place, given);
+        bt_warn(warnings, BT_WARN_OTHER_LATITUDE,
+                "the outlines lie at latitude %.4g deg, and water.latitude is %.4g deg; correct one",
+                place, given);
 }
 
 /// What a projection does to lengths and directions, by its scale at x = y = 0.
@@ -88,31 +90,30 @@ static void warn_of_plane(const bt_outline_counts *o, const bt_case *c, bt_error
     double along, across;
     bt_map_crs_scale(&crs, o->east, o->north, &along, &across);
     const bool turned = crs.any_north && c->domain.frame == BT_FRAME_GEOGRAPHIC;
-    bt_errors_add(
-        warnings,
-        "the outlines are metres of %s, used as plane coordinates: its scale factor, at x = y = 0 %.4g along the "
-        "meridian and %.4g across (areas %+.2g %%), and the angle of its north to the true one (convergence%s) are not "
-        "corrected, as `bergtow outlines` does%s",
-        crs.name, along, across, 100 * (along * across - 1),
-        crs.any_north ? ", any angle in a polar projection" : "",
-        turned ? "; x is the grid's north here: give wind, current and tow in that frame" : "");
+    bt_warn(warnings, BT_WARN_GRID_PLANE,
+            "the outlines are metres of %s, used as plane coordinates: its scale factor, at x = y = 0 %.4g along the "
+            "meridian and %.4g across (areas %+.2g %%), and the angle of its north to the true one (convergence%s) are "
+            "not corrected, as `bergtow outlines` does%s",
+            crs.name, along, across, 100 * (along * across - 1),
+            crs.any_north ? ", any angle in a polar projection" : "",
+            turned ? "; x is the grid's north here: give wind, current and tow in that frame" : "");
 }
 
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
 {
     if (o->unnamed)
-        bt_errors_add(warnings,
-                      "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the "
-                      "thickness of the case, %g m in the mean; rename the property if it is "
-                      "the thickness in metres",
-                      (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
+        bt_warn(warnings, BT_WARN_NO_THICKNESS,
+                "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the "
+                "thickness of the case, %g m in the mean; rename the property if it is the thickness in metres",
+                (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
     if (o->split && c->ice.rafting_kappa > 0)
-        bt_errors_add(warnings,
-                      "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; "
-                      "ice.nonconvex: hull lets them raft, with their hulls' outlines",
-                      (long long)o->split);
+        bt_warn(warnings, BT_WARN_STAYS_RIGID,
+                "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; "
+                "ice.nonconvex: hull lets them raft, with their hulls' outlines",
+                (long long)o->split);
     if (o->read && !o->bare && c->n_floes == 0 && bt_case_changed(c, "ice.thickness"))
-        bt_errors_add(warnings, "ice.thickness: no effect, for all outlines have a thickness of their own");
+        bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
+                "ice.thickness: no effect, for all outlines have a thickness of their own");
     warn_of_region(o, warnings);
     warn_of_latitude(o, c, warnings);
     warn_of_plane(o, c, warnings);

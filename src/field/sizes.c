@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Sizes of floes as drawn from the law of the case (case/size_law.h), and as they came out.
 #include "field/field_make.h"
+#include "case/warning.h"
 
 #include <math.h>
 
@@ -61,25 +62,25 @@ void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors
         const double mean = bt_sizes_mean(&s), second = bt_sizes_mean_area(&s) * 4 / BT_PI;
         const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = found->mean - mean;
         if (fabs(off) > SIZE_OFF * mean && fabs(off) > 2 * scatter)
-            bt_errors_add(warnings,
-                          "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
-                          "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
-                          "count on the diameter that was made",
-                          (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+            bt_warn(warnings, BT_WARN_MEAN_SIZE,
+                    "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
+                    "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
+                    "count on the diameter that was made",
+                    (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
         const double spread = sqrt(bt_max(second - mean * mean, 0)) / mean;
         if (s.law != BT_SIZE_POWER && spread < (1 - SPREAD_OFF) * s.spread)
-            bt_errors_add(warnings,
-                          "%s the sizes a spread of %.2g, where ice.size_spread asks for %.2g: all that is drawn "
-                          "beyond is drawn again; %slower ice.size_spread",
-                          s.law == BT_SIZE_LOGNORMAL ? "ice.size_min and ice.size_max leave"
-                                                     : "a least size of a tenth of the mean leaves",
-                          spread, s.spread, s.law == BT_SIZE_LOGNORMAL ? "move them apart, or " : "");
+            bt_warn(warnings, BT_WARN_SPREAD,
+                    "%s the sizes a spread of %.2g, where ice.size_spread asks for %.2g: all that is drawn "
+                    "beyond is drawn again; %slower ice.size_spread",
+                    s.law == BT_SIZE_LOGNORMAL ? "ice.size_min and ice.size_max leave"
+                                               : "a least size of a tenth of the mean leaves",
+                    spread, s.spread, s.law == BT_SIZE_LOGNORMAL ? "move them apart, or " : "");
         if (found->below > BELOW_OFF * n)
-            bt_errors_add(warnings,
-                          "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "
-                          "get the room that larger ones leave them; narrow the range of sizes, or lower the "
-                          "concentration",
-                          (int)found->below, (int)n, 100.0 * found->below / n, found->least);
+            bt_warn(warnings, BT_WARN_SMALL_FLOES,
+                    "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "
+                    "get the room that larger ones leave them; narrow the range of sizes, or lower the "
+                    "concentration",
+                    (int)found->below, (int)n, 100.0 * found->below / n, found->least);
     }
     bt_errors_free(&refused);
 }

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "case/warning.h"
 #include "output/estimate_text.h"
 #include "output/summary_keys.h"
 
@@ -56,6 +57,9 @@ void bt_quantities_list(void *stream)
         const bt_estimate_def *d = bt_estimate_of(k);
         fprintf(out, "%-24s %-15s %-24s %s; %s\n", d->name, bt_estimate_kind_name(d), d->label, d->formula, d->source);
     }
+    fprintf(out, "\n%-24s %s\n", "warning, reason", "meaning");
+    for (int k = 0; k < BT_N_WARNINGS; k++)
+        fprintf(out, "%-24s %s\n", bt_warning_rows[k].code, bt_warning_rows[k].meaning);
 }
 
 static void json_texts(bt_json *j, const char *name, const char *units, const char *description)
@@ -126,6 +130,13 @@ void bt_quantities_list_json(void *stream)
     bt_json_close(&j, ']');
     bt_json_open(&j, "estimates", '[');
     for (int k = 0; k < bt_n_estimates(); k++) json_estimate(&j, bt_estimate_of(k));
+    bt_json_close(&j, ']');
+    bt_json_open(&j, "warnings", '[');
+    for (int k = 0; k < BT_N_WARNINGS; k++) {
+        bt_json_open(&j, NULL, '{');
+        json_texts(&j, bt_warning_rows[k].code, "", bt_warning_rows[k].meaning);
+        bt_json_close(&j, '}');
+    }
     bt_json_close(&j, ']');
     bt_json_close(&j, '}');
     fputs(j.text, stream);

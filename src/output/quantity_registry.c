@@ -13,6 +13,11 @@
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
 const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};
+const char *const bt_applies_codes[BT_APPLIES_KINDS] = {
+    [BT_APPLIES_ALWAYS] = "always", [BT_APPLIES_BODY] = "body",       [BT_APPLIES_LINE] = "line",
+    [BT_APPLIES_BRIDLE] = "bridle", [BT_APPLIES_VESSEL] = "vessel",   [BT_APPLIES_IMPACTS] = "impacts",
+    [BT_APPLIES_WINDOW] = "moving",
+};
 const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_ALWAYS] = "always",
     [BT_APPLIES_BODY] = "with a towed body",

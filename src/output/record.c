@@ -46,6 +46,7 @@ static void create_series(bt_record *r)
         bt_h5_describe(&r->h5, name, NULL, f->units, f->description);
         bt_h5_attr_text(&r->h5, name, "merge", merge[f->keep]);
         bt_h5_attr_text(&r->h5, name, "applies", bt_applies_names[f->applies]);
+        bt_h5_attr_text(&r->h5, name, "needs", bt_applies_codes[f->applies]);
         bt_h5_attr_int(&r->h5, name, "order", k); // a group lists its members by name
         if (f->role != BT_ROLE_NONE) bt_h5_attr_text(&r->h5, name, "role", bt_role_names[f->role]);
         if (f->label) bt_h5_attr_text(&r->h5, name, "label", f->label);

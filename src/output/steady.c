@@ -4,7 +4,6 @@
 #include "base/units.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,7 @@
 #include "step/window.h"
 #include "case/case_check.h"
 #include "case/track.h"
+#include "case/warning.h"
 #include "base/ascending.h"
 #include "base/elementary.h"
 #include "output/summary.h"
@@ -29,19 +29,14 @@ static const struct { const char *name, *key; bt_column column; bool load, alway
     [BT_REPORTED_THRUST] = {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true, false},
 };
 
-/// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window
-/// too short.
-__attribute__((format(printf, 3, 4))) static void decide(bt_steady *s, bt_verdict verdict, const char *text, ...)
+/// Where a reason of this verdict goes. Those of one verdict stand one after the other; one of a run that is not steady
+/// takes the place of one of a window too short.
+static bt_errors *because(bt_steady *s, bt_verdict verdict)
 {
-    if (s->verdict == BT_NOT_STEADY && verdict == BT_TOO_SHORT) return;
-    if (s->verdict != verdict) s->reason[0] = '\0';
+    if (s->verdict == BT_NOT_STEADY && verdict == BT_TOO_SHORT) return NULL;
+    if (s->verdict != verdict) bt_errors_free(&s->reasons);
     s->verdict = verdict;
-    size_t used = strlen(s->reason);
-    if (used > 0 && used + 2 < sizeof s->reason) memcpy(s->reason + used, "; ", 3), used += 2;
-    va_list ap;
-    va_start(ap, text);
-    vsnprintf(s->reason + used, sizeof s->reason - used, text, ap);
-    va_end(ap);
+    return &s->reasons;
 }
 
 static int64_t first_at_or_after(const bt_history *h, double time)
@@ -131,7 +126,7 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
     s->earliest = bt_case_earliest_window(c);
     const int64_t earliest = first_at_or_after(h, s->earliest);
     int64_t first = earliest;
-    const char *settles = NULL;
+    int settles = -1; // which series
     if (s->given || earliest >= h->n) return first;
     const double *ice = h->column[BT_COL_ICE];
     for (int k = 0; k < BT_N_REPORTED; k++) {
@@ -147,14 +142,15 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
         }
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
-        if (start > earliest && start == bt_stats_last_start(h->n, earliest)) settles = reported[k].name;
+        if (start > earliest && start == bt_stats_last_start(h->n, earliest)) settles = k;
     }
-    if (settles)
-        decide(
-            s, BT_NOT_STEADY,
-            "the %s still settles where the search for a start ends, halfway from %g s to the end of the run, and the "
-            "window begins there (%g s): run longer",
-            settles, s->earliest, h->column[BT_COL_TIME][first]);
+    if (settles >= 0) {
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_SETTLING,
+                "the %s still settles where the search for a start ends, halfway from %g s to the end of the run, and "
+                "the window begins there (%g s): run longer",
+                reported[settles].name, s->earliest, h->column[BT_COL_TIME][first]);
+        bt_warn_name(&s->reasons, "series", reported[settles].key);
+    }
     return first;
 }
 
@@ -213,17 +209,15 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
     const double speed = t->tolerance / c->solver.tolerance;
     if (s->unconverged > BT_STEADY_UNCONVERGED)
-        decide(s, BT_NOT_STEADY,
-               "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise "
-               "solver.max_sweeps or "
-               "lower run.dt",
-               100 * s->unconverged, 100 * BT_STEADY_UNCONVERGED);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_UNCONVERGED_SHARE,
+                "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise "
+                "solver.max_sweeps or lower run.dt",
+                100 * s->unconverged, 100 * BT_STEADY_UNCONVERGED);
     if (s->residual > BT_STEADY_RESIDUAL * speed)
-        decide(s, BT_NOT_STEADY,
-               "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of %.3g "
-               "m/s: raise "
-               "solver.max_sweeps or lower run.dt",
-               s->residual, BT_STEADY_RESIDUAL, speed);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_RESIDUAL,
+                "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of "
+                "%.3g m/s: raise solver.max_sweeps or lower run.dt",
+                s->residual, BT_STEADY_RESIDUAL, speed);
 }
 
 /// Way of the towing end after this time, m. A vessel need not keep to its programme: it goes as far as its body.
@@ -289,19 +283,19 @@ static void judge_course(bt_steady *s, const bt_history *h, const bt_case *c, co
             continue;
         char when[60] = "that it begins to turn to";
         if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
-        decide(s, BT_NOT_STEADY,
-               "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run before, begin the "
-               "window later, or read the series",
-               turn * 180 / BT_PI, k + 1, when,
-               mark + arc > s->led[0] + slack ? "" : " for the body, which follows its line");
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_COURSE_CHANGES,
+                "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run before, begin "
+                "the window later, or read the series",
+                turn * 180 / BT_PI, k + 1, when,
+                mark + arc > s->led[0] + slack ? "" : " for the body, which follows its line");
         s->turns = true;
     }
     bt_path_free(&path);
     if (!turned || s->turns || c->tow.mode == BT_TOW_SPEED || !(swing(s, h) > COURSE_LEFT)) return;
-    decide(s, BT_NOT_STEADY,
-           "the course of the body, behind its line, still changes by %.3g deg within the window: begin it later, or "
-           "read the series",
-           swing(s, h) * 180 / BT_PI);
+    bt_warn(because(s, BT_NOT_STEADY), BT_WARN_COURSE_FOLLOWS,
+            "the course of the body, behind its line, still changes by %.3g deg within the window: begin it later, or "
+            "read the series",
+            swing(s, h) * 180 / BT_PI);
     s->turns = true;
 }
 
@@ -311,27 +305,28 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++) {
         if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= s->start || p[2 * i] >= s->end) continue;
-        decide(s, BT_NOT_STEADY,
-               "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read "
-               "the series",
-               p[2 * i + 1], p[2 * i + 3], s->start, s->end);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_PROGRAMME,
+                "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read "
+                "the series",
+                p[2 * i + 1], p[2 * i + 3], s->start, s->end);
     }
     for (int64_t i = 0; t->events && i < t->events->n; i++) {
         const bt_event *e = &t->events->event[i];
         if (e->kind == BT_EVENT_ADRIFT)
-            decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
+            bt_warn(because(s, BT_NOT_STEADY), BT_WARN_ADRIFT,
+                    "the last line parted at %g s, and nothing tows the body since", e->time);
         else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
-            decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after",
-                   e->time);
+            bt_warn(because(s, BT_NOT_STEADY), BT_WARN_PARTED_IN_WINDOW,
+                    "a line parted at %g s, within the window, whose means mix before and after",
+                    e->time);
     }
     if (!t->window) return;
     const double places = (double)(t->window->renewed + t->window->missed);
     if (places > 0 && (double)t->window->missed > BT_STEADY_MISSED * places)
-        decide(s, BT_NOT_STEADY,
-               "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or "
-               "carries it along: take a "
-               "longer domain",
-               100 * (double)t->window->missed / places);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_PLACES_MISSED,
+                "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or "
+                "carries it along: take a longer domain",
+                100 * (double)t->window->missed / places);
 }
 
 /// Way that the body has come on over ground within the window, along the leg of the tow that it is on, m; NaN = not
@@ -360,26 +355,27 @@ static void judge_track(bt_steady *s, const bt_history *h, const bt_case *c, con
                         .region = bt_outline_region(&totals->outlines)};
     bt_errors found = {0};
     bt_track_warn(c, &t, &found);
-    for (size_t k = 0; k < found.n; k++) decide(s, BT_NOT_STEADY, "%s", found.text[k]);
-    bt_errors_free(&found);
+    if (found.n) bt_errors_move(because(s, BT_NOT_STEADY), &found);
     const double asked =
         c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, s->end) - bt_case_tow_distance(c, s->start);
     const double way = come_on(s, h, c, totals);
     if (totals->stall.inside > 0)
-        decide(s, BT_NOT_STEADY,
-               "the towing end was within the hull for %.3g s, from %.4g s on: the body has overtaken it, and its line "
-               "pulls from behind",
-               totals->stall.inside, totals->stall.inside_from);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_END_INSIDE,
+                "the towing end was within the hull for %.3g s, from %.4g s on: the body has overtaken it, and its "
+                "line pulls from behind",
+                totals->stall.inside, totals->stall.inside_from);
     if (totals->stall.time > BT_STEADY_STALLED * s->end)
-        decide(s, BT_NOT_STEADY,
-               "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
-               "jams",
-               totals->stall.time, s->end);
-    else if (way < BT_STALL_SHARE * asked && !s->turns) // else the body may be on the leg before
-        decide(s, BT_NOT_STEADY,
-               "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
-               "does not come on",
-               asked, s->start, s->end, way < 0 ? "gone astern by" : "come on by", fabs(way));
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_STOOD_STILL,
+                "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
+                "jams",
+                totals->stall.time, s->end);
+    else if (way < BT_STALL_SHARE * asked && !s->turns) { // else the body may be on the leg before
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
+                "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
+                "does not come on",
+                asked, s->start, s->end, way < 0 ? "gone astern by" : "come on by", fabs(way));
+        bt_warn_number(&s->reasons, "way_m", way);
+    }
 }
 
 /// The first of the reported series with a trend that matters: the others mostly follow from it.
@@ -392,12 +388,16 @@ static void judge_trends(bt_steady *s)
         // that a few collisions came early or late is no trend
         if (s->stretches < BT_STEADY_STRETCHES && (k == BT_REPORTED_ICE || k == BT_REPORTED_TOW)) continue;
         if (!r->present || !t->significant || !(fabs(t->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
-        decide(s, BT_NOT_STEADY,
-               "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the "
-               "window later",
-               r->name, t->change > 0 ? "rises" : "falls", bt_force_text(change, fabs(t->change)),
-               bt_force_text(low, bt_min(fabs(t->low), fabs(t->high))),
-               bt_force_text(high, bt_max(fabs(t->low), fabs(t->high))), 100 * fabs(t->change / r->mean.mean));
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_TREND,
+                "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the "
+                "window later",
+                r->name, t->change > 0 ? "rises" : "falls", bt_force_text(change, fabs(t->change)),
+                bt_force_text(low, bt_min(fabs(t->low), fabs(t->high))),
+                bt_force_text(high, bt_max(fabs(t->low), fabs(t->high))), 100 * fabs(t->change / r->mean.mean));
+        bt_warn_name(&s->reasons, "series", r->key);
+        bt_warn_number(&s->reasons, "change_n", t->change);
+        bt_warn_number(&s->reasons, "low_n", t->low);
+        bt_warn_number(&s->reasons, "high_n", t->high);
         return;
     }
 }
@@ -410,18 +410,19 @@ static void judge_contact(bt_steady *s, const bt_run_totals *t)
     s->met_no_ice = t->concentration > 0 && ice->mean == 0 && ice->sd == 0;
     if (s->met_no_ice) s->stretches = 0;
     if (s->met_no_ice && t->lead.mode == BT_LEAD_CHANNEL)
-        decide(s, BT_TOO_SHORT,
-               "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it that "
-               "the ice does not come into the channel",
-               s->start, s->end, t->lead.width);
+        bt_warn(because(s, BT_TOO_SHORT), BT_WARN_NO_ICE_CHANNEL,
+                "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it "
+                "that the ice does not come into the channel",
+                s->start, s->end, t->lead.width);
     else if (s->met_no_ice)
-        decide(s, BT_TOO_SHORT, "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
-               s->start, s->end, 100 * t->concentration);
+        bt_warn(because(s, BT_TOO_SHORT), BT_WARN_NO_ICE,
+                "the body met no ice within the window, %g to %g s, in %.3g %% ice: run longer",
+                s->start, s->end, 100 * t->concentration);
     else if (ice->mean != 0 && s->stretches < BT_STEADY_STRETCHES)
-        decide(s, BT_TOO_SHORT,
-               "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
-               "worth %.2g equal ones, fewer than %d: run longer",
-               s->start, s->end, s->stretches, BT_STEADY_STRETCHES);
+        bt_warn(because(s, BT_TOO_SHORT), BT_WARN_FEW_CONTACTS,
+                "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
+                "worth %.2g equal ones, fewer than %d: run longer",
+                s->start, s->end, s->stretches, BT_STEADY_STRETCHES);
 }
 
 /// The load that is known worst, of those that vary; and a body on a line that has had no time to swing.
@@ -429,9 +430,9 @@ static void judge_length(bt_steady *s, const bt_case *c, double dt)
 {
     const double swings = BT_RAMP_PERIODS * bt_case_line_period(c), length = (double)s->n * dt;
     if (length < swings * (1 - 1e-9))
-        decide(s, BT_TOO_SHORT,
-               "the window of %g s is shorter than %g swings of the body on its line (%.3g s each): run longer", length,
-               BT_RAMP_PERIODS, bt_case_line_period(c));
+        bt_warn(because(s, BT_TOO_SHORT), BT_WARN_FEW_SWINGS,
+                "the window of %g s is shorter than %g swings of the body on its line (%.3g s each): run longer",
+                length, BT_RAMP_PERIODS, bt_case_line_period(c));
     const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
@@ -440,11 +441,13 @@ static void judge_length(bt_steady *s, const bt_case *c, double dt)
         if (!worst || r->mean.tau > worst->mean.tau) worst = r;
     }
     if (!worst) return;
-    decide(s, BT_TOO_SHORT,
-           "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
-           "longer",
-           (double)s->n * dt, (double)s->n / (2 * worst->mean.tau), worst->name, worst->mean.tau * dt,
-           BT_STEADY_INDEPENDENT);
+    bt_errors *reasons = because(s, BT_TOO_SHORT);
+    bt_warn(reasons, BT_WARN_FEW_SAMPLES,
+            "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
+            "longer",
+            (double)s->n * dt, (double)s->n / (2 * worst->mean.tau), worst->name, worst->mean.tau * dt,
+            BT_STEADY_INDEPENDENT);
+    bt_warn_name(reasons, "series", worst->key);
 }
 
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
@@ -455,10 +458,11 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     s->put_off = s->first - first_at_or_after(h, s->earliest);
     s->n = h->n - s->first;
     if (s->n == 0) {
-        decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
-               s->earliest, h->n ? time[h->n - 1] : 0, s->given                  ? "lower output.window_start"
-               : c->tow.n_programme > 0 ? "let tow.programme come to its largest speed earlier"
-                                        : "shorten tow.ramp");
+        bt_warn(because(s, BT_TOO_SHORT), BT_WARN_NO_WINDOW,
+                "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
+                s->earliest, h->n ? time[h->n - 1] : 0, s->given                  ? "lower output.window_start"
+                : c->tow.n_programme > 0 ? "let tow.programme come to its largest speed earlier"
+                                         : "shorten tow.ramp");
     } else {
         s->start = time[s->first];
         s->end = time[h->n - 1];
@@ -467,14 +471,14 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     if (s->n == 0) return;
     s->correlation_time = s->n > 1 ? s->series[BT_REPORTED_ICE].mean.tau * t->dt : NAN;
     if (!isfinite(s->series[BT_REPORTED_ICE].mean.mean) || !isfinite(s->series[BT_REPORTED_TOW].mean.mean))
-        decide(s, BT_NOT_STEADY,
-               "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_NOT_FINITE,
+                "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
     if (s->start < ramp * (1 - 1e-12))
-        decide(s, BT_NOT_STEADY,
-               "the window begins at %g s, before the %s at %g s: raise output.window_start",
-               s->start, c->tow.n_programme > 0 ? "tow comes to the largest speed of its programme"
-                                                : "ramp of the tow ends",
-               ramp);
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_WITHIN_RAMP,
+                "the window begins at %g s, before the %s at %g s: raise output.window_start",
+                s->start, c->tow.n_programme > 0 ? "tow comes to the largest speed of its programme"
+                                                 : "ramp of the tow ends",
+                ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
     judge_course(s, h, c, t);

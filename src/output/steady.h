@@ -62,7 +62,7 @@ typedef struct bt_reported {
 
 typedef struct bt_steady {
     bt_verdict verdict;
-    char reason[1200];            ///< of a verdict other than steady, else empty
+    bt_errors reasons;            ///< of a verdict other than steady (case/warning.h); release them
     double earliest, start, end;  ///< s; start and end NaN without a window
     double correlation_time;      ///< of the ice resistance, s
     double unconverged;           ///< share of the steps in the window that did not converge

@@ -7,6 +7,7 @@
 // and the same mean by momentum, without the contacts of the body (observe.c). The peak of step means depends on Δt:
 // the mean does not.
 #include "output/summary.h"
+#include "case/warning.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_idle.h"
@@ -97,15 +98,15 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     if (n == 0) return;
 
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
-        bt_errors_add(&s->warnings,
-                      "the mean ice resistance differs from %s by %.2g of the largest of them; the momentum balance of "
-                      "the towed body does not close",
-                      bt_balance_words(), fabs(s->closure_relative));
+        bt_warn(&s->warnings, BT_WARN_BODY_BALANCE,
+                "the mean ice resistance differs from %s by %.2g of the largest of them; the momentum balance of "
+                "the towed body does not close",
+                bt_balance_words(), fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
-        bt_errors_add(&s->warnings,
-                      "the mean ice resistance differs by %.2g from the one by momentum, without the contacts of the "
-                      "body; that balance does not close",
-                      fabs(s->budget_closure_relative));
+        bt_warn(&s->warnings, BT_WARN_ICE_BALANCE,
+                "the mean ice resistance differs by %.2g from the one by momentum, without the contacts of the "
+                "body; that balance does not close",
+                fabs(s->budget_closure_relative));
 }
 
 /// A line that broke changes what the means stand for.
@@ -113,9 +114,12 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
 {
     for (int64_t i = 0; e && i < e->n; i++) {
         if (e->event[i].kind != BT_EVENT_LINE_BROKEN && e->event[i].kind != BT_EVENT_ADRIFT) continue;
+        const bool adrift = e->event[i].kind == BT_EVENT_ADRIFT;
         char text[160];
         bt_event_describe(&e->event[i], text);
-        bt_errors_add(&s->warnings, "at %g s %s", e->event[i].time, text);
+        bt_warn(&s->warnings, adrift ? BT_WARN_ADRIFT : BT_WARN_LINE_BROKEN, "at %g s %s", e->event[i].time, text);
+        if (!adrift) bt_warn_number(&s->warnings, "branch", (double)e->event[i].subject);
+        bt_warn_number(&s->warnings, adrift ? "speed_m_s" : "tension_n", e->event[i].value);
     }
 }
 
@@ -123,8 +127,13 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
 /// its length.
 static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals *t)
 {
-    if (s->window.verdict != BT_STEADY)
-        bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
+    if (s->window.verdict != BT_STEADY) {
+        char *reasons = bt_warnings_text(&s->window.reasons);
+        bt_warn(&s->warnings, s->window.verdict == BT_TOO_SHORT ? BT_WARN_TOO_SHORT : BT_WARN_NOT_STEADY,
+                "%s: %s",
+                bt_verdict_names[s->window.verdict], reasons);
+        free(reasons);
+    }
     bt_case_warn_start(c, &s->warnings);
     s->arch = bt_arch_of(c, t->concentration, t->mean_size);
     bt_arch_warn(&s->arch, &s->warnings);
@@ -136,86 +145,81 @@ static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals 
 static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
 {
     if (c->solver.turn_rows != BT_TURN_ROWS)
-        bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
+        bt_warn(&s->warnings, BT_WARN_TURN_ROWS, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
-        bt_errors_add(&s->warnings,
-                      "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
-                      "tolerance %.2g m/s); %s",
-                      (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance,
-                      h->locked_steps >= (double)h->unconverged ? "more work would not help"
-                                                                : "raise solver.max_sweeps or lower run.dt");
+        bt_warn(&s->warnings, BT_WARN_UNCONVERGED,
+                "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
+                "tolerance %.2g m/s); %s",
+                (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance,
+                h->locked_steps >= (double)h->unconverged ? "more work would not help"
+                                                          : "raise solver.max_sweeps or lower run.dt");
     if (h->locked_steps > 0)
-        bt_errors_add(&s->warnings,
-                      "in %.0f of %lld steps bodies were locked between others that give way to nothing (walls, a body "
-                      "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
-                      BT_LOCKED_REMEDY,
-                      h->locked_steps, (long long)h->n);
+        bt_warn(&s->warnings, BT_WARN_LOCKED,
+                "in %.0f of %lld steps bodies were locked between others that give way to nothing (walls, a body "
+                "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
+                BT_LOCKED_REMEDY,
+                h->locked_steps, (long long)h->n);
     if (h->unprojected > 0)
-        bt_errors_add(&s->warnings,
-                      "in %lld of %lld steps the position projection met its limit of work and left overlap: raise "
-                      "solver.position_sweeps, or, where bodies are pressed together slower than the tolerance tells, "
-                      "lower solver.tolerance",
-                      (long long)h->unprojected, (long long)h->n);
+        bt_warn(&s->warnings, BT_WARN_UNPROJECTED,
+                "in %lld of %lld steps the position projection met its limit of work and left overlap: raise "
+                "solver.position_sweeps, or, where bodies are pressed together slower than the tolerance tells, "
+                "lower solver.tolerance",
+                (long long)h->unprojected, (long long)h->n);
     if (h->outrun)
-        bt_errors_add(
-            &s->warnings,
-            "in %lld of %lld steps a body moved farther than the contact detection looks ahead: a contact may have "
-            "been met a step late, as overlap, or missed; lower run.dt",
-            (long long)h->outrun, (long long)h->n);
+        bt_warn(&s->warnings, BT_WARN_OUTRUN,
+                "in %lld of %lld steps a body moved farther than the contact detection looks ahead: a contact may have "
+                "been met a step late, as overlap, or missed; lower run.dt",
+                (long long)h->outrun, (long long)h->n);
     if (h->restitution_cut)
-        bt_errors_add(
-            &s->warnings,
-            "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
-            (long long)h->restitution_cut, (long long)h->n);
+        bt_warn(&s->warnings, BT_WARN_REBOUNDS_LOWERED,
+                "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
+                (long long)h->restitution_cut, (long long)h->n);
     if (h->positive_work)
-        bt_errors_add(&s->warnings,
-                      "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
-                      (long long)h->positive_work, (long long)h->n);
+        bt_warn(&s->warnings, BT_WARN_ENERGY_ADDED,
+                "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
+                (long long)h->positive_work, (long long)h->n);
 }
 
 /// What the bodies came to.
 static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
 {
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
-        bt_errors_add(&s->warnings,
-                      "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
-                      "solver.position_sweeps",
-                      h->max_overlap, 100 * h->max_overlap / t->mean_size);
+        bt_warn(&s->warnings, BT_WARN_OVERLAP,
+                "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
+                "solver.position_sweeps",
+                h->max_overlap, 100 * h->max_overlap / t->mean_size);
     for (int law = 0; law < BT_LAWS; law++) {
-        if (!bt_laws[law]->doubt) continue;
-        char *doubt = bt_laws[law]->doubt(h->laws + bt_law_first_total(law), t->mean_size);
-        if (doubt) bt_errors_add(&s->warnings, "%s", doubt);
-        free(doubt);
+        if (bt_laws[law]->warn)
+            bt_laws[law]->warn(h->laws + bt_law_first_total(law), t->mean_size, &s->warnings);
     }
     if (t->stall.inside > 0)
-        bt_errors_add(&s->warnings,
-                      "the towing end was within the hull for %.3g s, from %.4g s on: a following current, a tow that "
-                      "slows down or a sharp turn let the body overtake it; nothing in the model keeps them apart, and "
-                      "the line pulls from behind afterwards",
-                      t->stall.inside, t->stall.inside_from);
+        bt_warn(&s->warnings, BT_WARN_END_INSIDE,
+                "the towing end was within the hull for %.3g s, from %.4g s on: a following current, a tow that "
+                "slows down or a sharp turn let the body overtake it; nothing in the model keeps them apart, and "
+                "the line pulls from behind afterwards",
+                t->stall.inside, t->stall.inside_from);
     if (t->stall.windows)
-        bt_errors_add(
-            &s->warnings,
-            "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a "
-            "path of a mean floe size, and the ice held it: a jam%s",
-            t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
-            c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0
-                ? ""
-                : "; rigid contact has no largest force: consider ice.rafting.kappa or ice.crushing.pressure");
+        bt_warn(&s->warnings, BT_WARN_STALLED,
+                "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over "
+                "a path of a mean floe size, and the ice held it: a jam%s",
+                t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
+                c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0
+                    ? ""
+                    : "; rigid contact has no largest force: consider ice.rafting.kappa or ice.crushing.pressure");
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
-        bt_errors_add(&s->warnings,
-                      "momentum is conserved only to %.2g of what the steps exchange; please report this case",
-                      h->max_momentum_residual);
+        bt_warn(&s->warnings, BT_WARN_MOMENTUM,
+                "momentum is conserved only to %.2g of what the steps exchange; please report this case",
+                h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
     bt_field_size_warn(c, &t->sizes, &s->warnings);
     if (t->mean_thickness > 0) bt_ice_warn(c, t->mean_size, t->mean_thickness, &s->warnings);
     warn_of_events(s, t->events);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
-        bt_errors_add(&s->warnings,
-                      "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
-                      "matters",
-                      (long long)t->floes_outside);
+        bt_warn(&s->warnings, BT_WARN_FLOES_LEFT,
+                "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
+                "matters",
+                (long long)t->floes_outside);
 }
 
 /// tow.direction is 0 by default and nothing drifts along it: what resists along it is no number of a free body.
@@ -223,11 +227,11 @@ static void without_tow(bt_summary *s, const bt_case *c)
 {
     if (c->tow.mode != BT_TOW_NONE) return;
     s->ice.mean = s->ice.se = s->ice.low = s->ice.high = NAN;
-    bt_errors_add(&s->warnings,
-                  "nothing tows the body, so there is no mean ice resistance: all other forces of the summary, and the "
-                  "series of ice_resistance, are those against tow.direction (%g deg), whatever way the body drifts; "
-                  "for the force of the ice read the series ice_force_x and ice_force_y",
-                  c->tow.direction * 180 / BT_PI);
+    bt_warn(&s->warnings, BT_WARN_NO_TOW,
+            "nothing tows the body, so there is no mean ice resistance: all other forces of the summary, and the "
+            "series of ice_resistance, are those against tow.direction (%g deg), whatever way the body drifts; "
+            "for the force of the ice read the series ice_force_x and ice_force_y",
+            c->tow.direction * 180 / BT_PI);
 }
 
 /// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
@@ -294,11 +298,11 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 {
     const double nan = NAN;
     *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
-    if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
+    if (t->stopped) bt_warn(&s->warnings, BT_WARN_STOPPED, "the run stopped early: %s", t->stopped);
     else if (t->n_steps < t->whole_steps)
-        bt_errors_add(&s->warnings,
-                      "the run ended after %lld of %lld steps, as it was asked to: `bergtow resume` takes the others",
-                      (long long)t->n_steps, (long long)t->whole_steps);
+        bt_warn(&s->warnings, BT_WARN_ENDED_EARLY,
+                "the run ended after %lld of %lld steps, as it was asked to: `bergtow resume` takes the others",
+                (long long)t->n_steps, (long long)t->whole_steps);
 
     const bt_mean none = bt_stats_mean(NULL, 0);
     s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
@@ -343,5 +347,6 @@ double bt_summary_held_against(const bt_summary *s) { return s->window.met_no_ic
 void bt_summary_free(bt_summary *s)
 {
     bt_errors_free(&s->warnings);
+    bt_errors_free(&s->window.reasons);
     *s = (bt_summary){0};
 }

@@ -10,6 +10,7 @@
 
 #include "output/estimate_text.h"
 #include "output/impact_report.h"
+#include "case/warning.h"
 #include "contact/raft.h"
 #include "step/window.h"
 
@@ -54,10 +55,6 @@ static double origin_north(const view *v) { return number_or_nan(outlines(v)->re
 static const char *crs(const view *v) { return outlines(v)->read ? outlines(v)->crs : ""; }
 
 static const char *verdict(const view *v) { return v->s->body ? bt_verdict_names[v->s->window.verdict] : NULL; }
-static const char *reason(const view *v)
-{
-    return v->s->body && v->s->window.verdict != BT_STEADY ? v->s->window.reason : NULL;
-}
 static const char *rule(const view *v) { return !v->s->body ? NULL : v->s->window.given ? "given" : "mser5"; }
 static double n_independent(const view *v) { return number_or_nan(v->s->window.n, v->s->ice.n_eff); }
 static double n_stretches(const view *v)
@@ -165,9 +162,13 @@ static void write_events(bt_json *j, const char *key, const view *v, const void 
 static void write_warnings(bt_json *j, const char *key, const view *v, const void *source)
 {
     (void)source;
-    bt_json_open(j, key, '[');
-    for (size_t i = 0; i < v->s->warnings.n; i++) bt_json_string(j, NULL, v->s->warnings.text[i]);
-    bt_json_close(j, ']');
+    bt_warnings_json(j, key, &v->s->warnings);
+}
+
+static void write_reasons(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    bt_warnings_json(j, key, &v->s->window.reasons);
 }
 
 // --- the tables ------------------------------------------------------------------------------------------------------
@@ -294,7 +295,7 @@ static const bt_json_key rows[] = {
         "mean ice resistance less that by momentum, over the largest of the means"),
     GROUP("window", NULL, "the window that the means refer to"),
     TEXT("window.verdict", verdict, "steady, not steady or too short"),
-    TEXT("window.reason", reason, "of a verdict other than steady"),
+    WRITTEN("window.reasons", write_reasons, "of a verdict other than steady: [{code, text, values}]"),
     OF_SUMMARY("window.earliest_s", window.earliest, "s", "earliest time at which the window may begin"),
     OF_SUMMARY("window.start_s", window.start, "s", "end of the first step of the window"),
     OF_SUMMARY("window.end_s", window.end, "s", "end of its last step"),
@@ -307,7 +308,6 @@ static const bt_json_key rows[] = {
         "share of the steps in the window that did not converge"),
     NUMBER("window.max_residual_m_s", window_residual, "m/s", "largest residual of a step in the window"),
     TEXT("window.rule", rule, "given by output.window_start, or mser5: found"),
-    TEXT("window.warning", reason, "the reason, under its name in earlier versions"),
     WRITTEN("window.series", write_reported, "what the verdict rests on, for each reported series"),
     GROUP("reference", has_reference, "the measured force of the case"),
     OF_CASE("reference.mean_force_n", reference.mean_force, "N", "measured mean force, given in the case"),
@@ -408,7 +408,7 @@ static const bt_json_key rows[] = {
     OF_TOTALS("stopped", stopped, "", "why the run ended early"),
     WRITTEN("events", write_events, "what happened, the first 40; all are in result.h5"),
     COUNT("n_events", n_events, "1", "how many there were"),
-    WRITTEN("warnings", write_warnings, "doubts about the numbers, in words"),
+    WRITTEN("warnings", write_warnings, "doubts about the numbers: [{code, text, values}]"),
 };
 
 /// The totals of the contact laws as keys.

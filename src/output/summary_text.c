@@ -12,6 +12,7 @@
 #include "output/summary.h"
 #include "output/summary_window.h"
 #include "case/case_derived.h"
+#include "case/warning.h"
 
 /// Shares of the wall time, in one line.
 static void print_phases(const bt_phases *p)
@@ -68,13 +69,20 @@ static void print_added(const bt_summary *s, bool forces)
     }
 }
 
+static void print_reasons(const char *label, const bt_steady *w)
+{
+    char *reasons = bt_warnings_text(&w->reasons);
+    printf("%s %s\n", label, reasons);
+    free(reasons);
+}
+
 static void print_forces(const bt_summary *s, const bt_case *c)
 {
     static const char *const loud[] = {"steady", "NOT STEADY", "TOO SHORT"};
     const bt_steady *w = &s->window;
     char a[32], b[32], d[32];
     if (w->n == 0) {
-        printf("  window              none: %s\n", w->reason);
+        print_reasons("  window              none:", w);
         for (int k = 0; k < BT_N_REPORTED; k++)
             if (isfinite(w->series[k].start_peak))
                 printf("    largest before it %s of the %s\n", bt_force_text(a, w->series[k].start_peak),
@@ -85,7 +93,8 @@ static void print_forces(const bt_summary *s, const bt_case *c)
            w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff);
     if (isfinite(w->correlation_time)) printf(", correlation time %.3g s", w->correlation_time);
     printf("\n");
-    if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
+    if (w->verdict == BT_NOT_STEADY) print_reasons("    not steady       ", w);
+    if (w->verdict == BT_TOO_SHORT) print_reasons("    too short        ", w);
     printf("  %s\n",
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     if (c->tow.mode == BT_TOW_NONE) printf("    ice resistance    none: nothing tows the body\n");

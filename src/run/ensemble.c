@@ -159,7 +159,8 @@ static bt_status gather(bt_ensemble *e, bool wait)
     const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
     if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
     else if (fd >= 0 && bt_member_take_lock(fd, wait))
-        status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
+        status = bt_ensemble_gather(e->s, e->o->dir, &e->records, &e->warnings,
+                                    wait ? e->err : &unheard);
     if (fd >= 0 && wait) complete_journal(e);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
@@ -397,5 +398,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     free(e.list);
     bt_study_files_free(&e.files);
     bt_member_records_end(&e.records);
+    bt_member_notes_free(&e.warnings);
     return bt_comm_agree(comm, status);
 }

@@ -4,13 +4,19 @@
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
 //     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a
 //                                                        waiting member's process died, or that its result is not sound
+//     /members/hole [M]                                  which of these, by a name that stays: failed, died, unsound,
+//                                                        unreadable
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the
 //                                                        case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or
-//                                                        machine; nested ones as A_B; NaN where there is none;
+//                                                        machine; nested ones as A_B; NaN where there is none; the
+//                                                        verdict as a number;
 //                                                        attributes: key (A.B), order, and as registered units,
 //                                                        description; of an estimate also its name, label, kind
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
+//     /events/member, time, kind, subject, value [E]     as /events of result.h5 has them, kind by its name; no group
+//                                                        without one
+//     /warnings, /reasons, /codes                        ensemble_notes.h
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members,
 //                                                        n_finished, n_failed
 //
@@ -27,6 +33,8 @@
 #include <unistd.h>
 
 #include "bergtow/ensemble.h"
+#include "bergtow/event.h"
+#include "run/ensemble_notes.h"
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
@@ -40,6 +48,7 @@
 
 static const char *const series[] = {"time", "ice_resistance", "tow_force"};
 enum { N_SERIES = sizeof series / sizeof *series };
+#define VERDICT "window.verdict"
 
 typedef struct {
     char *name, *key; ///< A_B, and A.B as it is registered
@@ -49,11 +58,18 @@ typedef struct {
 typedef struct {
     int64_t n;
     int64_t *id, *condition, *repeat, *seed, *status; ///< [n]
-    char **name, **hash, **reason;
+    char **name, **hash, **reason, **hole;
+    bt_member_notes warnings, reasons;
     column *column;
     int n_columns;
     int64_t unread; ///< members that have finished and could not be read
 } table;
+
+static void put_text(char **to, const char *text)
+{
+    free(*to);
+    *to = bt_text_copy(text);
+}
 
 static double *column_of(table *t, const char *name, const char *key)
 {
@@ -64,6 +80,14 @@ static double *column_of(table *t, const char *name, const char *key)
     *c = (column){bt_text_copy(name), bt_text_copy(key), bt_alloc((size_t)t->n, sizeof(double))};
     for (int64_t m = 0; m < t->n; m++) c->value[m] = NAN;
     return c->value;
+}
+
+/// 0, 1 or 2; NaN of what is no verdict.
+static double verdict_number(const char *name)
+{
+    for (int k = 0; name && k <= BT_TOO_SHORT; k++)
+        if (!strcmp(name, bt_verdict_names[k])) return k;
+    return NAN;
 }
 
 /// prefix: of the registered key, with its dots.
@@ -80,6 +104,7 @@ static void take_numbers(table *t, int64_t m, const json_t *object, const char *
         if (json_is_object(value)) take_numbers(t, m, value, path);
         else if (json_is_number(value)) column_of(t, name, path)[m] = json_number_value(value);
         else if (json_is_boolean(value)) column_of(t, name, path)[m] = json_is_true(value);
+        else if (!strcmp(path, VERDICT)) column_of(t, name, path)[m] = verdict_number(json_string_value(value));
     }
 }
 
@@ -90,21 +115,20 @@ static bt_status take_summary(table *t, int64_t m, const char *folder, bt_errors
     if (status != BT_OK) return status;
     take_numbers(t, m, root, "");
     const char *hash = json_string_value(json_object_get(root, "state_hash"));
-    if (hash) {
-        free(t->hash[m]);
-        t->hash[m] = bt_text_copy(hash);
-    }
+    if (hash) put_text(&t->hash[m], hash);
+    bt_member_notes_take(&t->warnings, t->id[m], json_object_get(root, "warnings"));
+    bt_member_notes_take(&t->reasons, t->id[m], json_object_get(json_object_get(root, "window"), "reasons"));
     json_decref(root);
     return BT_OK;
 }
 
-/// Series of a member; returns its length, 0 when there is none. A read that fails is kept in h: the numbers of a
-/// member that has finished are there, and a row without them would be taken for one that has not.
-static hsize_t read_series(bt_h5 *h, const char *folder, int which, double **out)
+/// A column of a member's result.h5; returns its length, 0 when there is none. A read that fails is kept in h: the
+/// numbers of a member that has finished are there, and a row without them would be taken for one that has not.
+static hsize_t read_column(bt_h5 *h, const char *folder, const char *group, const char *column_name, double **out)
 {
     *out = NULL;
     char *path = bt_file_join(folder, "result.h5"), name[64];
-    snprintf(name, sizeof name, "/series/%s", series[which]);
+    snprintf(name, sizeof name, "%s/%s", group, column_name);
     hsize_t n = 0;
     int errnum = 0;
     const hid_t file = bt_h5_open_file(path, &errnum), set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
@@ -131,7 +155,7 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
         char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
         double *x;
-        const hsize_t n = read_series(h, folder, 0, &x);
+        const hsize_t n = read_column(h, folder, "/series", series[0], &x);
         if (n > most) most = n;
         free(x);
         free(folder);
@@ -146,7 +170,8 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
         for (int64_t m = 0; m < t->n; m++) {
             char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
             double *x;
-            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_series(h, folder, k, &x) : (x = NULL, 0);
+            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_column(h, folder, "/series", series[k], &x)
+                                                                    : (x = NULL, 0);
             for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
             bt_h5_append(h, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
             free(x);
@@ -158,6 +183,65 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
                        bt_series_find(series[k])->description);
         free(name);
     }
+}
+
+/// Events of all members: of a line that parted the statistics ask when, and which.
+static void write_events(bt_h5 *h, const table *t, const char *dir)
+{
+    static const struct {
+        const char *name, *units, *meaning;
+    } columns[] = {{"time", "s", "end of the step"},
+                   {"kind", NULL, "what happened"},
+                   {"subject", "1", "which branch (line_broken) or way-point (waypoint), from 1"},
+                   {"value", NULL,
+                    "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"}};
+    enum { TIME, KIND, SUBJECT, VALUE, N_COLUMNS };
+    bt_events all = {0};
+    int64_t *member = NULL;
+    for (int64_t m = 0; m < t->n; m++) {
+        if (t->status[m] != BT_MEMBER_FINISHED) continue;
+        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+        double *x[N_COLUMNS];
+        hsize_t n = read_column(h, folder, "/events", columns[TIME].name, &x[TIME]);
+        for (int k = KIND; k < N_COLUMNS; k++) {
+            x[k] = NULL;
+            const hsize_t others = n ? read_column(h, folder, "/events", columns[k].name, &x[k]) : 0;
+            n = others < n ? others : n;
+        }
+        member = bt_realloc(member, (size_t)all.n + n + 1, sizeof *member);
+        for (hsize_t i = 0; i < n; i++) {
+            member[all.n] = t->id[m];
+            bt_events_add(&all, x[TIME][i], (bt_event_kind)x[KIND][i], (int64_t)x[SUBJECT][i], x[VALUE][i]);
+        }
+        for (int k = 0; k < N_COLUMNS; k++) free(x[k]);
+        free(folder);
+    }
+    const hsize_t n = (hsize_t)all.n;
+    double *time = bt_alloc(n, sizeof *time), *value = bt_alloc(n, sizeof *value);
+    int64_t *subject = bt_alloc(n, sizeof *subject);
+    const char **kind = bt_alloc(n, sizeof *kind);
+    for (hsize_t i = 0; i < n; i++) {
+        const bt_event *e = &all.event[i];
+        time[i] = e->time, subject[i] = e->subject, value[i] = e->value;
+        kind[i] = e->kind >= 0 && e->kind < BT_EVENT_KINDS ? bt_event_names[e->kind] : "unknown";
+    }
+    if (n > 0) {
+        bt_h5_group(h, "/events");
+        bt_h5_write(h, "/events/member", H5T_NATIVE_INT64, n, 0, member);
+        bt_h5_describe(h, "/events/member", "event", "1", "number of the member in the study, from 1");
+        bt_h5_write(h, "/events/time", H5T_NATIVE_DOUBLE, n, 0, time);
+        bt_h5_write_names(h, "/events/kind", n, kind);
+        bt_h5_write(h, "/events/subject", H5T_NATIVE_INT64, n, 0, subject);
+        bt_h5_write(h, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value);
+        for (int k = 0; k < N_COLUMNS; k++) {
+            char *path = bt_file_join("/events", columns[k].name);
+            bt_h5_describe(h, path, "event", columns[k].units, columns[k].meaning);
+            free(path);
+        }
+    }
+    void *arrays[] = {member, time, value, subject, kind};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
+    bt_events_free(&all);
 }
 
 /// A parameter as numbers, or as texts where it is a choice or a name.
@@ -216,6 +300,7 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
         t->reason[m] =
             bt_text_of("its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again",
                        why.n ? why.text[0] : "no reason given");
+        put_text(&t->hole[m], status == BT_ERR_IO ? "unreadable" : "unsound");
     }
     bt_errors_free(&why);
     return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
@@ -226,7 +311,7 @@ static void fill(table *t, const bt_study *s, const char *dir, bt_member_records
     t->n = bt_study_n_members(s);
     int64_t **numbers[] = {&t->id, &t->condition, &t->repeat, &t->seed, &t->status};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) *numbers[k] = bt_alloc((size_t)t->n, sizeof(int64_t));
-    char ***texts[] = {&t->name, &t->hash, &t->reason};
+    char ***texts[] = {&t->name, &t->hash, &t->reason, &t->hole};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) *texts[k] = bt_alloc((size_t)t->n, sizeof(char *));
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
@@ -239,6 +324,8 @@ static void fill(table *t, const bt_study *s, const char *dir, bt_member_records
         t->name[m] = bt_text_copy(member.name);
         t->hash[m] = bt_text_copy("");
         t->status[m] = bt_ensemble_state(folder, NULL, &t->reason[m]);
+        const bool died = t->status[m] == BT_MEMBER_WAITING && t->reason[m];
+        put_text(&t->hole[m], t->status[m] == BT_MEMBER_FAILED ? "failed" : died ? "died" : "");
         if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
         if (!t->reason[m]) t->reason[m] = bt_text_copy("");
         free(folder);
@@ -252,13 +339,17 @@ static void release(table *t)
         free(t->name[m]);
         free(t->hash[m]);
         free(t->reason[m]);
+        free(t->hole[m]);
     }
+    bt_member_notes_free(&t->warnings);
+    bt_member_notes_free(&t->reasons);
     for (int k = 0; k < t->n_columns; k++) {
         free(t->column[k].name);
         free(t->column[k].key);
         free(t->column[k].value);
     }
-    void *arrays[] = {t->id, t->condition, t->repeat, t->seed, t->status, t->name, t->hash, t->reason, t->column};
+    void *arrays[] = {t->id, t->condition, t->repeat, t->seed, t->status,
+                      t->name, t->hash, t->reason, t->hole, t->column};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
 }
 
@@ -269,6 +360,7 @@ static void describe(bt_h5 *h, const char *name, const char *key, int order)
     bt_h5_attr_text(h, name, "key", key);
     bt_h5_attr_int(h, name, "order", order);
     bt_h5_describe(h, name, "member", m.known && *m.units ? m.units : "1", m.known ? m.description : key);
+    if (!strcmp(key, VERDICT)) bt_h5_attr_text(h, name, "meaning", "0 steady, 1 not steady, 2 too short");
     if (!m.known) return;
     const struct {
         const char *name, *text;
@@ -290,7 +382,8 @@ static void describe_members(bt_h5 *h)
                   {"/members/status", "1", "0 waiting, 1 finished, 2 failed"},
                   {"/members/name", NULL, "folder of the member"},
                   {"/members/state_hash", NULL, "hash of the state at its end"},
-                  {"/members/reason", NULL, "why it failed"}};
+                  {"/members/reason", NULL, "why it failed, died or is not sound"},
+                  {"/members/hole", NULL, "failed, died, unsound or unreadable"}};
     for (size_t k = 0; k < sizeof columns / sizeof *columns; k++)
         bt_h5_describe(h, columns[k].name, "member", columns[k].units, columns[k].meaning);
     bt_h5_attr_text(h, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
@@ -315,6 +408,7 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     bt_h5_write_names(h, "/members/name", n, (const char *const *)t->name);
     bt_h5_write_names(h, "/members/state_hash", n, (const char *const *)t->hash);
     bt_h5_write_names(h, "/members/reason", n, (const char *const *)t->reason);
+    bt_h5_write_names(h, "/members/hole", n, (const char *const *)t->hole);
     describe_members(h);
     bt_h5_group(h, "/parameters");
     for (int p = 0; p < s->n_parameters; p++) write_parameter(h, s, p, t->n);
@@ -326,6 +420,10 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
         free(name);
     }
     write_series(h, t, s, dir);
+    write_events(h, t, dir);
+    bt_member_notes_write(h, &t->warnings, "/warnings", "warning", "code of the warning");
+    bt_member_notes_write(h, &t->reasons, "/reasons", "reason", "code of a reason of the verdict");
+    bt_warning_codes_write(h);
     bt_h5_write_text(h, "/study", s->text);
     bt_h5_describe(h, "/study", NULL, NULL, "the study file as it was given");
     bt_h5_describe_file(h, s->title);
@@ -345,7 +443,8 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     bt_h5_attr_int(h, "/", "complete", finished + failed == t->n);
 }
 
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err)
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_member_notes *warnings,
+                             bt_errors *err)
 {
     table t = {0};
     fill(&t, s, dir, records);
@@ -366,6 +465,9 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
                       path, t.unread);
         status = BT_ERR_IO;
     }
+    bt_member_notes_free(warnings);
+    *warnings = t.warnings;
+    t.warnings = (bt_member_notes){0};
     free(part);
     free(path);
     release(&t);

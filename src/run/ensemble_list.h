@@ -39,6 +39,7 @@ typedef struct bt_ensemble {
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded
     bt_member_records records;
+    bt_member_notes warnings; ///< of the members in ensemble.h5
     bt_study_files files; ///< on the first rank of a group
     double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
     bt_errors *err;

@@ -20,6 +20,7 @@
 
 #include "bergtow/base.h"
 #include "bergtow/study.h"
+#include "run/ensemble_notes.h"
 
 enum { BT_DIGEST_TEXT = 33 };
 
@@ -53,7 +54,8 @@ bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *na
 bt_status bt_member_record_forget(const char *folder, bt_errors *err);
 
 /// Make DIR/ensemble.h5 from the files of the members that are sound by these records; the caller holds DIR/lock.
-/// Errors: BT_ERR_IO.
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err);
+/// warnings: what these members warn of, in place of what it holds. Errors: BT_ERR_IO.
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_member_notes *warnings,
+                             bt_errors *err);
 
 #endif

@@ -84,6 +84,23 @@ static int by_index(const void *a, const void *b)
     return ((const bt_entry *)a)->index < ((const bt_entry *)b)->index ? -1 : 1;
 }
 
+/// What members warn of: of each code the text of the first, and how many others there are.
+static void print_warnings(const bt_ensemble *e)
+{
+    const bt_member_notes *w = &e->warnings;
+    for (int64_t i = 0; i < w->n; i++) {
+        int64_t others = 0, last = w->member[i];
+        bool first = true;
+        for (int64_t k = 0; k < i && first; k++) first = strcmp(w->code[k], w->code[i]) != 0;
+        for (int64_t k = i + 1; k < w->n && first; k++)
+            if (w->member[k] != last && !strcmp(w->code[k], w->code[i])) others++, last = w->member[k];
+        if (!first) continue;
+        printf("  warning: %s (%s", w->text[i], e->list[w->member[i] - 1].m.name);
+        if (others) printf("; and %" PRId64 " more", others);
+        printf(")\n");
+    }
+}
+
 bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
 {
     counts n = {0};
@@ -113,6 +130,7 @@ bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
         printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
         if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
         printf("; %s/ensemble.h5\n", e->o->dir);
+        print_warnings(e);
     }
     return worst;
 }

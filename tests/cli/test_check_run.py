@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from harness import CASE, DONE, IO, PRESS, TOW, call, changed, reading, run, write_case
+from harness import CASE, DONE, IO, PRESS, TOW, call, changed, reading, run, texts, write_case
 
 GB = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
 PIER = {"shape": "square", "length": 1, "x": 6, "y": 0, "fixed": True}
@@ -48,7 +48,7 @@ def test_keys_that_the_ice_leaves_unused(tmp_path):
         assert r.returncode == DONE and IDLE in r.stdout
         r = call("run", *words, "-o", tmp_path / "out", "--force", "--quiet", "--set", "run.duration=2",
                  cwd=tmp_path)
-        assert IDLE in json.loads((tmp_path / "out/summary.json").read_text())["warnings"]
+        assert IDLE in texts(json.loads((tmp_path / "out/summary.json").read_text())["warnings"])
     again = call("check", tmp_path / "out/case.resolved.yml")
     assert again.returncode == DONE and IDLE in again.stdout
 
@@ -151,7 +151,13 @@ def test_warnings_of_a_study(tmp_path):
     write_case(tmp_path, LOOSE, "base.yml")
     (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2]}}')
     lines = call("check", "study.yml", cwd=tmp_path).stdout.splitlines()
-    assert lines[0] == "study.yml: valid, with warnings in 1 of 2 conditions" and lines[-1].startswith(lines[0] + "; ")
+    assert lines[0] == lines[-1] == "study.yml: valid, with warnings in 1 of 2 conditions"
+    said, = call("check", "base.yml", "--set", "run.dt=0.2", cwd=tmp_path).stdout.splitlines()[-2:-1]
+    assert said.startswith("warning              run.dt: 0.2 s") and lines[-2] == said + " (condition 2: run.dt 0.2)"
+    # of one code the first stands for all
+    (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2, 0.3]}}')
+    lines = call("check", "study.yml", cwd=tmp_path).stdout.splitlines()
+    assert lines[-2] == said + " (condition 2: run.dt 0.2; and 1 more)" and "warning" not in lines[-3]
 
 
 # ---- no sizes of a basin at full scale ----
@@ -202,5 +208,5 @@ def test_rows_of_a_table_that_no_step_sees(tmp_path):
     said = ("water.current_table: rows that change the velocity within less than a time step of 0.1 s: 2, the first at "
             "5.04 s")
     assert said in call("check", case).stdout
-    assert [w for w in run(tmp_path, case, "--steps", 5).summary["warnings"] if w.startswith(said)]
+    assert [w for w in run(tmp_path, case, "--steps", 5).warnings if w.startswith(said)]
     assert "rows that change" not in call("check", case, "--set", "run.dt=0.04").stdout

@@ -2,6 +2,7 @@
 """postproc/converge.py: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
 import json
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import case_runs  # noqa: E402
 import converge  # noqa: E402
 import converge_text  # noqa: E402
+import soundness  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 
 
@@ -253,6 +255,9 @@ def settled(runs, i, values=None, name="case", **summary):
     """A run as the program leaves it, without its results."""
     runs.path(name, i).mkdir(parents=True, exist_ok=True)
     (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
+    for file in ("result.h5", "case.resolved.yml"):
+        (runs.path(name, i) / file).write_text(f"{file} of field {i}")
+    soundness.keep(runs.path(name, i), *runs.record(name, i, values or {}))
     (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(i, values or {})))
 
 
@@ -270,6 +275,48 @@ def test_a_file_that_the_case_names_is_a_part_of_it(tmp_path, where):
     assert runs_of(tmp_path, case, given).kept("case", 0, values)
     (tmp_path / "current.csv").write_text("t,u,v\n0,1,0\n")
     assert not runs_of(tmp_path, case, given).kept("case", 0, values)
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-20])
+
+
+def another(path):
+    shutil.copy(path.parents[1] / "f002" / path.name, path)
+
+
+@pytest.mark.parametrize("file, change, said", [
+    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json changed since"),
+    ("summary.json", cut, "summary.json changed since"), ("summary.json", another, "summary.json changed since"),
+    ("summary.json", Path.unlink, "summary.json is missing"), ("result.h5", another, "result.h5 changed since"),
+    ("finished", another, "is of another run"), ("finished", cut, "changed since"), ("finished", Path.unlink, "missing")])
+def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
+    """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
+    first = runs_of(tmp_path, CASE)
+    for i in range(2):
+        settled(first, i)
+    runs = runs_of(tmp_path, CASE)
+    assert runs.kept("case", 0, {}) and runs.kept("case", 1, {}) and not capsys.readouterr().err
+    change(runs.path("case", 0) / file)
+    for again in (runs, runs_of(tmp_path, CASE)):  # looked at before, and not
+        assert not again.kept("case", 0, {}) and again.kept("case", 1, {})
+        warning, = capsys.readouterr().err.splitlines()
+        assert warning.startswith("converge.py: warning: ") and "case/f001: " in warning and said in warning
+        assert not again.kept("case", 0, {}) and not capsys.readouterr().err  # said once
+
+
+def test_a_changed_run_is_made_again(tmp_path):
+    """Red at an effect of -0.016 in place of 0.00013, exit code 0; and at a traceback where the summary was cut."""
+    write_case(tmp_path, changed(CASE, run__duration=5, output__window_start=2))
+    call = ["converge.py", "case.yml", "-o", "out", "--vary", "tolerance", "--jobs", "2"]
+    assert script(*call, cwd=tmp_path).returncode == 0
+    sound = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
+    one, other = (tmp_path / f"out/converge/{name}/summary.json" for name in ("case/f001", "tolerance-1/f002"))
+    one.write_text(re.sub(r'("mean_ice_resistance_n": )\S+', r"\g<1>1e6,", one.read_text()))
+    cut(other)
+    again = script(*call, "--force", cwd=tmp_path)
+    assert again.returncode == 0 and again.stderr.count("summary.json changed since it finished; the run is made") == 2
+    assert json.loads((tmp_path / "out/converge.json").read_text())["rows"] == sound
 
 
 def test_runs_are_kept_however_the_folder_is_spelt(tmp_path, monkeypatch):
@@ -322,7 +369,7 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
 def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
     made = case_runs.CaseRuns.begin
     monkeypatch.setattr(case_runs.CaseRuns, "begin", lambda runs, name, i, values: made(runs, name, i, values) if
-                        name == "case" else (5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n"))
+                        name == "case" else (5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n", False))
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     short = changed(CASE, run__duration=5, output__window_start=2)
     path = write_case(tmp_path, short)

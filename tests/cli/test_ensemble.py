@@ -88,6 +88,19 @@ def test_a_row_for_each_member(quiet):
         "members ", "")
 
 
+def test_warnings_of_the_members_are_printed(quiet):
+    """Once for each code, in the words of the first member that has it; also by a call that finds all finished."""
+    folder, result = quiet
+    wanted = {}
+    for path in sorted((folder / "all/members").glob("*/summary.json")):
+        for code, text in {w["code"]: w["text"] for w in reversed(json.loads(path.read_text())["warnings"])}.items():
+            wanted.setdefault(code, [text, path.parent.name, 0])[2] += 1
+    lines = [f"  warning: {text} ({name}{f'; and {n - 1} more' if n > 1 else ''})" for text, name, n in wanted.values()]
+    for said in (result.stdout, ensemble(folder).stdout):
+        assert sorted(line for line in said.splitlines() if line.startswith("  warning: ")) == sorted(lines) != []
+    assert "warning" not in ensemble(folder, "all", "--quiet").stdout
+
+
 def test_finished_members_are_not_run_again(quiet):
     folder, _ = quiet
     before = len(journal(folder))

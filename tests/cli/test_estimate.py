@@ -317,7 +317,7 @@ def test_no_jam_is_reported_where_no_ice_holds_the_body(tmp_path):
     for name, case in (("weak", weak), ("parted", parted)):
         r = run(tmp_path, case, name=name)
         assert r.summary["stalled_s"] == 0, name
-        assert not any("jam" in w for w in r.summary["warnings"]), r.summary["warnings"]
+        assert not any("jam" in w for w in r.warnings), r.warnings
     assert any(e["kind"] == "adrift" for e in r.summary["events"])
     assert r.summary["estimates"]["speed_along_m_s"] is None
 
@@ -348,9 +348,9 @@ def test_a_floe_by_hand_is_no_undisturbed_ice_beside_a_field(tmp_path):
 def test_ice_that_a_tide_carries_past_a_moving_window_is_reported(tmp_path):
     """Red when the ends of the ways are compared: a tide brings the ice back."""
     tide = changed(DRIVEN, air__wind_x=0, water={"tide": {"major": 0.8, "period": 800}}, run__duration=800)
-    assert any("ice overtook the body" in w for w in run(tmp_path, tide, name="tide").summary["warnings"])
+    assert any("ice overtook the body" in w for w in run(tmp_path, tide, name="tide").warnings)
     slow = changed(DRIVEN, air__wind_x=0, water={"current_x": 0.1}, run__duration=30, output__window_start=25)
-    assert not any("ice overtook" in w for w in run(tmp_path, slow, name="slow").summary["warnings"])
+    assert not any("ice overtook" in w for w in run(tmp_path, slow, name="slow").warnings)
 
 
 def test_a_body_that_stands_still_is_held_against_no_estimate_of_a_moving_one(tmp_path):

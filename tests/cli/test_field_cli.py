@@ -263,4 +263,4 @@ def test_sizes_that_are_not_those_of_the_law_are_said(tmp_path, spread, said):
         mean = np.sqrt(4 * f["floes/area"][:] / np.pi).mean()
     assert f"mean diameter {mean:.4g} m" in done.stdout
     assert (abs(mean / 20 - 1) > 0.05) == said == ("that of ice.size_law" in done.stdout), done.stdout
-    assert any("that of ice.size_law" in w for w in run(tmp_path, case).summary["warnings"]) == said
+    assert any("that of ice.size_law" in w for w in run(tmp_path, case).warnings) == said

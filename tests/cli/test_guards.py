@@ -141,7 +141,7 @@ def test_the_largest_overlap_includes_the_last_state(tmp_path):
     deep = measured(r)
     assert deep > 1.01 * r.series("overlap").max(), "the last state is no deeper than those before: nothing is tested"
     assert r.summary["max_overlap_m"] == pytest.approx(deep, rel=1e-6)
-    assert any(re.match(rf"bodies overlap by up to {deep:.2g} m", w) for w in r.summary["warnings"])
+    assert any(re.match(rf"bodies overlap by up to {deep:.2g} m", w) for w in r.warnings)
 
 
 def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):

@@ -3,6 +3,7 @@
 import argparse
 import csv
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -219,22 +220,17 @@ def test_fields_that_differ_are_found(process, fields, n, least):
 def test_warnings_name_the_reason_of_the_verdict(tmp_path):
     """Every verdict was said to be of loads that change; and of a condition whose members failed other reasons were
     named."""
-    reasons = ("the last line parted at 603 s, and nothing tows the body since",
-               "the last line parted at 41.5 s, and nothing tows the body since; the tow force rises over the window "
-               "by 12 kN (95 %: 3 to 21), 30 % of its mean: run longer, or begin the window later",
-               "the tow force rises over the window by 12 kN (95 %: 3 to 21), 30 % of its mean: run longer",
-               "1.2 % of the steps in the window did not converge, more than the 1 % that a mean bears: raise it", None)
-    some = [made_up.member(np.arange(100.0) + k, {"ice.concentration": 0.5}, 0,
-                           window={"verdict": "not steady" if why else "steady", "reason": why})
-            for k, why in enumerate(reasons)]
+    reasons = (["adrift"], ["adrift", "trend"], ["trend"], ["unconverged_share"], [])
+    some = [made_up.member(np.arange(100.0) + k, {"ice.concentration": 0.5}, 0, reasons=[*map(made_up.note, why)],
+                           window={"verdict": "not steady" if why else "steady"}) for k, why in enumerate(reasons)]
     some += [made_up.member(np.ones(100), {"ice.concentration": 0.9}, 1, status=made_up.FAILED, reason="exit code 5")
              for _ in range(2)]
     result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
                     "--time-scale", 10)
     assert result.returncode == 0, result.stderr
     warned = [line.removeprefix("WARNING: ") for line in result.stdout.splitlines() if line.startswith("WARNING")]
-    for words, n in (("the last line parted", 2), ("the tow force rises over the window", 1),
-                     ("the steps in the window did not converge", 1)):
+    for code, n in (("adrift", 2), ("trend", 1), ("unconverged_share", 1)):
+        words = dict(made_up.CODES)[code]
         assert f"Members whose window is not steady, since {words}: concentration 50 % ({n} of 5 members)." in warned
     assert [w for w in warned if "concentration 90 %" in w] == [
         "Nothing is known of a condition without a member that is in the numbers: concentration 90 % (2 failed)."]
@@ -340,9 +336,9 @@ SERIES = {
     "tow_force": {"units": "N", "description": "towing force", "label": "tow force", "role": "balance", "order": 1},
     "ice_resistance": {"units": "N", "description": "ice", "label": "ice resistance", "role": "balance", "order": 2},
     "line_tension_1": {"units": "N", "description": "first branch", "label": "line tension", "role": "load",
-                       "applies": "with a tow line", "order": 3},
+                       "needs": "line", "order": 3},
     "line_tension_2": {"units": "N", "description": "second branch", "label": "tension of the second branch",
-                       "role": "load", "applies": "with a tow line of two branches", "order": 4},
+                       "role": "load", "needs": "bridle", "order": 4},
     "vessel_thrust": {"units": "N", "description": "thrust", "label": "vessel thrust", "role": "load", "order": 5},
     "largest_push": {"units": "N", "description": "push", "label": "", "role": "", "order": 6},
     "impact_peak": {"units": "N", "description": "peak", "label": "", "role": "", "order": 7},
@@ -351,7 +347,7 @@ CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load
         "  crushing:\n    pressure: {pressure} Pa\n")
 
 
-def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None, jerk=1e9, earlier=False):
+def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None, jerk=1e9):
     """Ensemble of AR(1) tow forces of mean 1 MN and 3 MN with a start-up jerk before the window, in 1 s samples."""
     rng, members = np.random.default_rng(4), []
     for c, a in enumerate(concentrations):
@@ -359,17 +355,14 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
             x = made_up.ar1(0.8, N, rng, 1e6 * (1 + 2 * c), 2e5)
             x[:30] = jerk
             dense = a > 0.8
-            # of an earlier program the warning alone says it
-            warned = ["domain.width: 15 body widths", "ice.concentration: 90 %"] if dense and earlier else []
-            domain = {} if earlier else {"domain_body_widths": 15, "sim_time_s": N,
-                                         "domain_load_unbounded": dense and pressure == 0,
-                                         "domain_body_widths_needed": 60 if dense else np.nan}
+            domain = {"domain_body_widths": 15, "sim_time_s": N, "domain_load_unbounded": dense and pressure == 0,
+                      "domain_body_widths_needed": 60 if dense else np.nan}
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
                       "line_tension_2": (0.98 + 0.05 * c) * x,
                       "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
                       "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
-            members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, warnings=warned,
-                                          more=series, attributes=SERIES, summary={"concentration": a, **domain},
+            members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, more=series,
+                                          attributes=SERIES, summary={"concentration": a, **domain},
                                           case=text or CASE.format(pressure=pressure, load=load)))
     return made_up.write(folder, members)
 
@@ -486,13 +479,6 @@ def test_what_moves_water_and_air_and_a_lead_stand_in_what_a_value_holds_for():
     assert said(["lead.floe_size", "lead.width"], **lead | {"lead__mode": "managed"}) == \
         "a lead 400 m long of pieces, no current, no wind"
     assert said(["lead.mode"], **still | lead | {"lead__mode": "channel"}) == "no current, no wind"
-
-
-def test_members_of_an_earlier_program_say_it_in_their_warnings(tmp_path):
-    e = Ensemble(towed(tmp_path / "a", fields=2, earlier=True))
-    for k, c in enumerate(e.conditions()):
-        assert ["", "2 of 2 members"][k] == statement_module.domain(e, c.finished)
-        assert statement_module.unbounded(e, c.finished) == (k == 1)
 
 
 @pytest.mark.slow
@@ -662,7 +648,7 @@ def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
 BREAKING = 1.5e6  # N
 
 
-def parting(folder, at, second=None, events=True, fields=10, jerk=None):
+def parting(folder, at, second=None, fields=10, jerk=None):
     """Ensemble of tows on a line or, with the tension of a second branch as a factor of that of the first, a bridle,
     with a collision each 10 s. at: {member: [(time s, branch)]} at which branches part; the tow force ends with the
     last of them. jerk: {member: N} that come on top at 101 to 150 s."""
@@ -679,14 +665,13 @@ def parting(folder, at, second=None, events=True, fields=10, jerk=None):
         happened = [{"kind": "line_broken", "time_s": t, "subject": b, "value": 1.1 * BREAKING}
                     for b, t in broken.items()] + [{"kind": "adrift", "time_s": end, "subject": 0, "value": 0.4}
                                                    for _ in range(int(np.isfinite(end)))]
-        told = {"summary": {"events": happened}} if events else {
-            "warnings": [f"not steady: the last line parted at {end:g} s, and nothing tows the body since"] * (end < n)}
         series = {"tow_force": tow, "ice_resistance": tow, **{f"line_tension_{b}": x for b, x in tensions.items()}}
         case = CASE.format(pressure=0, load=BREAKING).replace("line:\n", f"line:\n    branches: {branches}\n")
         case = case.replace("ice:\n", f"  branch2:\n    breaking_load: {BREAKING / 2} N\nice:\n", 1)
         members.append(made_up.member(tow, {"ice.concentration": 0.5}, 0, start=301.0, more=series, attributes=SERIES,
                                       window={"verdict": "not steady" if end < n else "steady"}, case=case,
-                                      peaks=(time[304::10], np.ones(170)), hours=1700 / 3600, **told))
+                                      peaks=(time[304::10], np.ones(170)), hours=1700 / 3600,
+                                      summary={"events": happened}))
     return made_up.write(folder, members)
 
 
@@ -694,11 +679,9 @@ def warnings_of(s):
     return [f"{w['what']} ({w['detail']})" for w in s["conditions"][0]["design"]["warnings"]]
 
 
-@pytest.mark.parametrize("events", [True, False])
-def test_where_a_line_parts_there_is_no_design_value(tmp_path, events):
+def test_where_a_line_parts_there_is_no_design_value(tmp_path):
     """What comes after is in no number, and the tails of what ends at the breaking load are refused."""
-    s, text = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)], 7: [(1800, 1)]},
-                             events=events))
+    s, text = of_all(parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)], 7: [(1800, 1)]}))
     c, first = s["conditions"][0], warnings_of(s)[0]
     assert first.startswith("tow force and tension have no design value where a line parts: they are cut off there")
     assert "the line parted in 4 of 10 tows, " in first and "the first at 200 s; in 4 of them nothing towed" in first
@@ -779,12 +762,18 @@ def test_each_branch_has_its_own_breaking_load(tmp_path):
     assert "snap loads, which are shorter, are not in it" in text and "breaking load 1500 kN" in text
 
 
-def test_members_without_their_folder_may_have_parted(tmp_path):
-    folder = parting(tmp_path / "a", {}, fields=6)
-    (folder / "members/c001-r002").rename(folder / "elsewhere")
-    s, _ = of_all(folder)
-    assert "whether the line parted is not known of members whose folders are not there (1 of 6 members)" in \
-        warnings_of(s)
+def test_members_without_their_folders_parted_all_the_same(tmp_path):
+    """Red when events were in their folders alone: tows adrift had means of the whole window, and no word of it."""
+    folder = parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)]}, fields=6)
+    there, _ = of_all(folder)
+    means = Ensemble(folder).mean
+    shutil.rmtree(folder / "members")
+    e, (gone, _) = Ensemble(folder), of_all(folder)
+    assert np.array_equal(e.mean, means, equal_nan=True) and np.isnan(means[[3, 4]]).all()
+    assert [e.adrift(m) for m in range(6)] == [900, np.inf, np.inf, 310, 200, np.inf]
+    for s in (there, gone):
+        assert s["without_mean"] == ["c001-r004", "c001-r005"] and "the line parted in 3 of 6 tows" in warnings_of(s)[0]
+    assert gone["conditions"][0]["resistance"]["mean"] == there["conditions"][0]["resistance"]["mean"]
 
 
 def test_the_picture_of_return_levels(statement):

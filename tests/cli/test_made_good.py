@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, call, changed, run, warned, write_case
+from harness import CASE, DONE, call, changed, reasons, run, warned, write_case
 
 LINE = {"mode": "line", "speed": 0.5, "ramp": 60, "line_length": 100, "line_stiffness": 1e8, "line_damping": 5e5}
 BERG = {
@@ -20,10 +20,6 @@ BERG = {
 VESSEL = {"mass": 2e6, "bollard_pull": 5e4, "free_speed": 5}
 
 
-def reason(r):
-    return r.summary["window"]["reason"] or ""
-
-
 @pytest.mark.parametrize("current, said", [(-0.6, "gone astern by"), (-0.1, None)])
 def test_a_tow_that_goes_astern_is_not_steady(tmp_path, current, said):
     """The way through the water says nothing of it: that counted as coming on."""
@@ -33,7 +29,7 @@ def test_a_tow_that_goes_astern_is_not_steady(tmp_path, current, said):
     r = run(tmp_path, case)
     x = r.series("body_x")
     assert (x[-1] < x[0]) == bool(said)
-    assert (said in reason(r)) if said else "does not come on" not in reason(r), r.summary["window"]
+    assert (said in r.reason) if said else "does not come on" not in r.reason, r.summary["window"]
 
 
 def test_a_body_that_overtakes_its_towing_end_is_reported(tmp_path):
@@ -43,14 +39,14 @@ def test_a_body_that_overtakes_its_towing_end_is_reported(tmp_path):
     whole = run(tmp_path, case)
     time = whole.series("time")[np.abs(whole.series("carriage_x") - whole.series("body_x")) < 29.9]
     assert len(time) > 50
-    assert warned(whole, "within the hull for") and "the body has overtaken it" in reason(whole)
-    found = re.search(r"within the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", reason(whole))
+    assert warned(whole, "within the hull for") and "the body has overtaken it" in whole.reason
+    found = re.search(r"within the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", whole.reason)
     assert abs(float(found[1]) - 2 * len(time)) < 10 and abs(float(found[2]) - time[0]) < 6
     part = run(tmp_path, case, "--steps", str(int(time[10] / 2)), name="part")
     assert call("resume", part.dir).returncode == DONE
-    assert json.loads((part.dir / "summary.json").read_text())["window"]["reason"] == reason(whole)
+    assert reasons(json.loads((part.dir / "summary.json").read_text())) == whole.reason
     held = run(tmp_path, changed(case, water__current_x=0), name="held")
-    assert not warned(held, "within the hull") and "overtaken" not in reason(held)
+    assert not warned(held, "within the hull") and "overtaken" not in held.reason
 
 
 def test_a_body_adrift_overtakes_nothing(tmp_path):
@@ -60,7 +56,7 @@ def test_a_body_adrift_overtakes_nothing(tmp_path):
                    tow=tow | {"programme": [[0, 2], [60, 2], [70, 0.2]], "line": {"breaking_load": 1}})
     r = run(tmp_path, case)
     assert any(e["kind"] == "adrift" for e in r.summary["events"]), r.summary["events"]
-    assert not warned(r, "within the hull") and "overtaken" not in reason(r)
+    assert not warned(r, "within the hull") and "overtaken" not in r.reason
     assert (np.abs(r.series("carriage_x") - r.series("body_x")) < 25).any()
 
 
@@ -79,7 +75,7 @@ def test_a_turn_takes_its_whole_arc(tmp_path, start, end, turns):
                                  "ends": "open", "sides": "open"}, tow=tow, output__window_start=start,
                    run__duration=end if end > 700 else 480)
     r = run(tmp_path, case)
-    assert ("the course changes by 90 deg at way-point 1" in reason(r)) == turns, r.summary["window"]
+    assert ("the course changes by 90 deg at way-point 1" in r.reason) == turns, r.summary["window"]
 
 
 def test_a_body_on_a_line_follows_for_some_lengths_of_it(tmp_path):
@@ -93,7 +89,7 @@ def test_a_body_on_a_line_follows_for_some_lengths_of_it(tmp_path):
         k = int(start / 2)
         course = np.degrees(np.arctan2(r.series("body_vy"), r.series("body_vx")))[k:k + 100].mean()
         assert abs(course - 90) > 8 if turns else abs(course - 90) < 6
-        assert bool(re.search("the course (of the body, behind its line, still )?changes by", reason(r))) == turns
+        assert bool(re.search("the course (of the body, behind its line, still )?changes by", r.reason)) == turns
 
 
 def test_the_ordered_speed_is_that_over_the_current_of_the_window(tmp_path):

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, IO, area, call, changed, placed, run, write_case
+from harness import CASE, DONE, IO, area, call, changed, placed, run, texts, write_case
 
 BASE = {
     "run": {"dt": 0.1, "duration": 2},
@@ -403,7 +403,7 @@ def test_the_shipped_example(tmp_path):
 def warnings_of(folder, case, *words):
     r = call("check", write_case(folder, case), "--json", *words)
     assert r.returncode == DONE, r.stderr
-    return json.loads(r.stdout)["warnings"], json.loads(r.stdout)["ice"]["concentration"]
+    return texts(json.loads(r.stdout)["warnings"]), json.loads(r.stdout)["ice"]["concentration"]
 
 
 def test_the_concentration_is_that_of_the_ice_region(tmp_path):

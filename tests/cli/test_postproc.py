@@ -111,9 +111,9 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
         f.create_dataset("bodies/names", data=["towed body", "wall y low"], dtype=h5py.string_dtype())
     summary = {"title": "Square", "n_floes": 2, "n_steps": n, "concentration": 0.8, "mean_ice_resistance_n": 10.0,
                "mean_ice_resistance_se_n": 0.5, "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
-               "window": {"start_s": 3.0, "end_s": 10.0, "verdict": "steady", "reason": None, "warning": None},
+               "window": {"start_s": 3.0, "end_s": 10.0, "verdict": "steady", "reasons": []},
                "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None,
-               "warnings": ["first doubt", "second doubt", "third doubt"]}
+               "warnings": [{"code": "overlap", "text": f"{n} doubt", "values": {}} for n in ("first", "second", "third")]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return folder
 
@@ -356,7 +356,7 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
 def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
     folder = make_run(tmp_path / "run")
     summary = json.loads((folder / "summary.json").read_text())
-    summary["window"].update(verdict="not steady", reason="it rises")
+    summary["window"].update(verdict="not steady", reasons=[{"code": "trend", "text": "it rises", "values": {}}])
     (folder / "summary.json").write_text(json.dumps(summary))
     with Run(folder) as run:
         assert run.verdict == ("not steady", "it rises") and run.window_name == "window"

@@ -48,7 +48,7 @@ def study(tmp_path_factory):
                        c, case=f"ice:\n  concentration: {concentration}\ndomain:\n  width: 10 m\n",
                        peaks=(times, rng.exponential(50.0, 60))))
     some[3] |= {"status": FAILED, "reason": "exit code 5: not <finite>"}
-    some[6] |= {"warnings": [JAM], "summary": {"stalled_windows": 2}}
+    some[6] |= {"warnings": [made_up.note("stalled", JAM)], "summary": {"stalled_windows": 2}}
     some[9] |= {"status": WAITING}
     return made_up.write(tmp_path_factory.mktemp("study") / "out", some, title=TITLE)
 
@@ -155,12 +155,12 @@ def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode)
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS | {"resamples": 1})
     monkeypatch.setitem(made_up.UNITS, "tow.direction", "rad")
     rng, line = np.random.default_rng(8), {"units": "N", "description": "first branch", "label": "line tension",
-                                           "role": "load", "applies": "with a tow line", "order": 3}
+                                           "role": "load", "needs": "line", "order": 3}
     def one(c):
         x = made_up.ar1(0.6, 4000, rng, 137.0, 10.0)
         return member(x, {"tow.direction": c * np.pi / 4}, c, case=f"tow:\n  mode: {mode}\n  direction: 0 rad\n",
                       more={"tow_force": x} | ({"line_tension_1": x + 1} if mode == "line" else {}),
-                      attributes={"tow_force": line | {"role": "balance", "applies": "with a towed body"},
+                      attributes={"tow_force": line | {"role": "balance", "needs": "body"},
                                   "line_tension_1": line})
     folder = made_up.write(tmp_path / "out", [one(c) for c in (0, 1) for _ in range(4)])
     report.main([str(folder), "-o", str(tmp_path / "page.html")])
@@ -208,7 +208,7 @@ def test_members_of_other_builds_and_lost_folders_are_reported(study):
     assert "2 builds" in e.builds
     assert "2 builds" in " ".join(report_ensemble.context(study)["warnings"])
     (study / "members/c001-r002").rename(study / "members/lost")
-    assert "cannot be read" in report_ensemble.reported(e, 1)[0]
+    assert Ensemble(study).without_folder == ["c001-r002"]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]

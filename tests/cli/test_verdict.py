@@ -6,7 +6,7 @@ import math
 import re
 
 import pytest
-from harness import CASE, DONE, ROOT, TOW, USAGE, call, changed, run, write_case
+from harness import CASE, DONE, ROOT, TOW, USAGE, call, changed, reasons, run, texts, write_case
 
 # A disc of 80 m on a line of 400 m, almost in open water: 3 million kg per metre of draft and a period of a minute and
 # a half.
@@ -62,7 +62,7 @@ def test_a_short_ramp_is_reported_by_check_and_by_the_run(jerked, tmp_path):
     checked = call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": 5})))
     assert checked.returncode == DONE and "TOO SHORT: the start jerks the line" in checked.stdout
     assert "tow.ramp: 5 s is short for a body that swings on its line in" in checked.stdout
-    assert any("tow.ramp: 5 s is short" in w for w in jerked.summary["warnings"])
+    assert any("tow.ramp: 5 s is short" in w for w in jerked.warnings)
 
 
 def test_the_start_is_not_in_the_means(slow, jerked):
@@ -89,7 +89,7 @@ def test_a_mean_that_is_not_steady_is_called_so(jerked, tmp_path):
     """The given window begins in the swing, and the verdict stands in the console, too."""
     r = run(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": 5}, run__duration=300, output={"window_start": 0}))
     assert r.summary["window"]["verdict"] == "not steady"
-    assert "before the ramp of the tow ends at 5 s" in r.summary["window"]["reason"]
+    assert "before the ramp of the tow ends at 5 s" in r.reason
     assert "NOT STEADY" in r.result.stdout and "means over the window, not of a steady tow" in r.result.stdout
     assert "means of the steady tow" not in r.result.stdout
 
@@ -97,13 +97,12 @@ def test_a_mean_that_is_not_steady_is_called_so(jerked, tmp_path):
 def test_a_berg_adrift_is_no_steady_tow(tmp_path):
     tow = {**BERG["tow"], "ramp": 5, "line": {"type": "dyneema", "diameter": "150 mm"}}
     r = run(tmp_path, changed(BERG, tow=tow, run__duration=600))
-    assert r.summary["window"]["verdict"] == "not steady" and "nothing tows the body since" in r.summary["window"][
-        "reason"]
+    assert r.summary["window"]["verdict"] == "not steady" and "nothing tows the body since" in r.reason
 
 
 def test_a_run_within_its_ramp_has_no_window(tmp_path):
     r = run(tmp_path, changed(BERG, run__duration=100))
-    assert r.summary["window"]["verdict"] == "too short" and "it would begin at" in r.summary["window"]["reason"]
+    assert r.summary["window"]["verdict"] == "too short" and "it would begin at" in r.reason
     assert r.summary["mean_tow_force_n"] is None and "window              none" in r.result.stdout
 
 
@@ -112,7 +111,7 @@ def test_the_length_of_a_window_is_that_of_its_steps(tmp_path):
     short = run(tmp_path, changed(TOW, run__duration=5, run__dt=0.1, output__window_start=4.5))
     w = short.summary["window"]
     assert w["n_samples"] == 6 and w["start_s"] == pytest.approx(4.5) and w["end_s"] == pytest.approx(5)
-    assert "the window of 0.6 s holds" in w["reason"]
+    assert "the window of 0.6 s holds" in short.reason
     assert "end of the first step of the window" in call("--list-quantities").stdout
 
 
@@ -123,7 +122,7 @@ def test_without_a_tow_there_is_no_ice_resistance(tmp_path):
     s = r.summary
     assert [s[f"mean_ice_resistance{k}_n"] for k in ("", "_se", "_low", "_high")] == [None] * 4
     assert "ice resistance    none: nothing tows the body" in r.result.stdout
-    said, = [w for w in s["warnings"] if w.startswith("nothing tows the body, so there is no mean ice resistance")]
+    said, = [w for w in texts(s["warnings"]) if w.startswith("nothing tows the body, so there is no mean ice resistance")]
     assert "against tow.direction (0 deg)" in said
     force, resistance = r.series("ice_force_x", "ice_resistance")
     assert abs(force).max() > 0 and (force == -resistance).all()
@@ -171,7 +170,7 @@ def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
     dense = changed(BERG, ice__concentration=0.8, run__duration=5)
     words = "of rigid floes: from some 75 % on (assumed) they lock, and their load has no upper bound"
     assert words in call("check", write_case(tmp_path, dense)).stdout
-    assert any(words in text for text in run(tmp_path, dense).summary["warnings"])
+    assert any(words in text for text in run(tmp_path, dense).warnings)
     for looser in (changed(dense, ice__concentration=0.7), changed(dense, ice__rafting={"kappa": 10}),
                    changed(dense, ice__crushing={"pressure": 1e5})):
         assert "upper bound" not in call("check", write_case(tmp_path, looser)).stdout
@@ -199,11 +198,11 @@ def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
                    body={"length": 2, "x": 3, "draft": 0.5},
                    tow={"mode": "line", "speed": 0.3, "ramp": 1, "line_length": 2, "line_stiffness": 500})
     long = run(tmp_path, case, name="long")
-    said = [w for w in long.summary["warnings"] if "reaches the wall" in w]
+    said = [w for w in long.warnings if "reaches the wall" in w]
     assert len(
         said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
     short = run(tmp_path, case, "--steps", 45, name="short")
-    assert not any("reaches the wall" in w for w in short.summary["warnings"])
+    assert not any("reaches the wall" in w for w in short.warnings)
 
 
 # 30 m disc at 0.5 m/s; 400 m of ice, or what the domain is set to.
@@ -244,7 +243,7 @@ def test_a_body_that_comes_to_its_own_wake_is_no_steady_tow(tmp_path, name):
     if begins is None:
         return
     r = run(tmp_path, case, "--quiet", "--force")
-    reason = r.summary["window"]["reason"]
+    reason = r.reason
     assert r.summary["window"]["verdict"] == "not steady"
     for text in (checked, reason):
         at = float(re.search(rf"from ([0-9.e+]+) s on {OPENED}", text)[1])
@@ -257,7 +256,7 @@ def test_a_resumed_run_knows_where_it_has_been(tmp_path):
     assert call("resume", "cut", "--quiet", cwd=tmp_path).returncode == DONE
     cut = json.loads((tmp_path / "cut/summary.json").read_text())
     assert (cut["window"], cut["state_hash"]) == (whole.summary["window"], whole.summary["state_hash"])
-    assert OPENED in cut["window"]["reason"]
+    assert OPENED in reasons(cut)
 
 
 LEFT = "the body leaves the ice at"
@@ -281,7 +280,7 @@ def test_a_body_that_leaves_the_ice_is_no_steady_tow(tmp_path, changes, at):
         return
     r = run(tmp_path, case, "--quiet")
     assert r.summary["window"]["verdict"] == "not steady"
-    for text in (checked, r.summary["window"]["reason"]):
+    for text in (checked, r.reason):
         assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(at, rel=0.02), text
 
 
@@ -292,7 +291,7 @@ def test_the_region_of_a_field_file_is_its_own(tmp_path):
     write_case(tmp_path, changed(base, ice__x_max=0), "base.yml")
     case = {"base": "base.yml", "ice": {"field": "field.h5"}}
     checked = call("check", write_case(tmp_path, case)).stdout
-    reason = run(tmp_path, case, "--quiet").summary["window"]["reason"]
+    reason = run(tmp_path, case, "--quiet").reason
     for text in (checked, reason):
         assert float(re.search(rf"{LEFT} ([0-9.e+]+) s", text)[1]) == pytest.approx(400, rel=0.02), text
 
@@ -305,8 +304,8 @@ def test_a_gap_of_a_field_file_is_seen(tmp_path):
     checked = call("check", write_case(tmp_path, case), cwd=tmp_path).stdout
     r = run(tmp_path, case, "--quiet", "--steps", 200)
     assert call("resume", "out", "--quiet", cwd=tmp_path).returncode == DONE
-    reason = json.loads((r.dir / "summary.json").read_text())["window"]["reason"]
-    for text in (checked, reason):
+    said = reasons(json.loads((r.dir / "summary.json").read_text()))
+    for text in (checked, said):
         assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and comes into", text)[1]) == pytest.approx(200, rel=0.02)
 
 
@@ -321,7 +320,7 @@ def test_a_window_of_less_than_two_swings_is_too_short(tmp_path):
     """Red as steady with two steps: what does not vary within them."""
     r = run(tmp_path, changed(BERG, ice={"concentration": 0}, output__window_start=1490), "--quiet")
     assert r.summary["window"]["verdict"] == "too short"
-    assert "is shorter than 2 swings of the body on its line" in r.summary["window"]["reason"]
+    assert "is shorter than 2 swings of the body on its line" in r.reason
 
 
 def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
@@ -329,8 +328,8 @@ def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
     case = changed(BERG, ice={"concentration": 0}, run__duration=600, tow={
         "mode": "thrust", "speed": 0.5, "ramp": 10, "line_length": 400, "line_stiffness": "100 MN",
         "line_damping": "500 kN s/m", "vessel": {"mass": "5000 t", "bollard_pull": 100, "free_speed": 8}})
-    window = run(tmp_path, case, "--quiet").summary["window"]
-    assert window["verdict"] == "not steady" and "it does not come on" in window["reason"], window
+    r = run(tmp_path, case, "--quiet")
+    assert r.summary["window"]["verdict"] == "not steady" and "it does not come on" in r.reason, r.reason
 
 
 def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
