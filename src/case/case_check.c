@@ -7,6 +7,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
+#include "case/case_frame.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
@@ -97,6 +98,7 @@ static void follow(const check *k)
         bt_check_fill(&f->thickness, c->ice.thickness);
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
+    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
 }
@@ -245,34 +247,6 @@ static void check_sizes(const check *k)
         bt_check_fault(k, power ? "ice.size_min" : "ice.size",
                        "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
                        BT_MOST_FLOES);
-}
-
-// The defaults of ice and body are those of a model basin. At full scale a number that the user did not give would look
-// like an answer.
-/// by_hand: there are floes of the list without a thickness of their own.
-static void check_geographic(const check *k, bool by_hand)
-{
-    const bt_case *c = k->c;
-    if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
-    const bool read = bt_case_reads_field(c),
-               made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0),
-               body = c->body.shape != BT_BODY_ABSENT;
-    const struct {
-        const char *key, *what;
-        bool needed;
-    } keys[] = {{"ice.concentration", "area fraction of ice, as in 50 %, or 0 for open water", !read},
-                // that asks for both its ends
-                {"ice.size", "mean floe diameter, as in 30 m", made && c->ice.size_law != BT_SIZE_POWER},
-                {"ice.thickness", "mean floe thickness, as in 1 m", made || by_hand},
-                {"body.length", "length of the towed body, as in 80 m, or set body.shape: none",
-                 body && c->body.shape != BT_BODY_POLYGON},
-                {"body.draft", "its depth below the waterline, as in 60 m, or set body.shape: none", body}};
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        if (keys[i].needed && !bt_check_given(k, keys[i].key))
-            bt_check_fault(k, keys[i].key,
-                           "missing, and in domain.frame: geographic it has no default (that would be a model "
-                           "basin's); add it (%s)",
-                           keys[i].what);
 }
 
 static void check_outlines(const check *k)
@@ -547,21 +521,22 @@ static void check_floe(const check *k, int index)
                       axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
 }
 
-bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
+bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
 {
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
     bool by_hand = false;
     for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || isnan(c->floes[i].thickness);
+    bt_case_frame_clear(&k, by_hand);
     bt_case_tow_course(&k);
     follow(&k);
     bt_case_tow_follow(&k);
     bt_status loaded = bt_case_load_tables(c, err);
     size_t at_files = err->n;
+    bt_case_frame_check(&k, by_hand);
     check_run(&k);
     check_domain(&k);
     check_region(&k);
-    check_geographic(&k, by_hand);
     check_sizes(&k);
     check_outlines(&k);
     bt_case_check_idle(&k);

@@ -9,9 +9,10 @@
 #include "case/case_derived.h"
 #include "case/case_faults.h"
 
-/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err. Reads the
+/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL; those of values that are missing are marked
+/// as faulty. Appends every fault to err. Reads the
 /// tables that the case names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
-bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
+bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err);
 
 /// The default of a number that is not given.
 static inline void bt_check_fill(double *member, double value)

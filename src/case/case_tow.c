@@ -9,6 +9,7 @@
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
+#include "case/case_frame.h"
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
@@ -209,12 +210,14 @@ void bt_case_tow_follow(const bt_check *k)
     }
     bt_case_tow_course(k);
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-    bt_check_fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
+    const bool named = c->tow.line.type != BT_ROPE_NUMBERS, at_sea = c->domain.frame == BT_FRAME_GEOGRAPHIC;
+    bt_check_fill(&c->tow.line_stiffness, named ? rope.stiffness : at_sea && has_line(c) ? NAN : 10e3);
     bt_check_fill(&c->tow.line.breaking_load, rope.breaking);
     bt_check_fill(&c->tow.branch2.length, c->tow.line_length);
     bt_check_fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
-    bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
     bt_check_fill(&c->tow.branch2.breaking_load, c->tow.line.breaking_load);
+    bt_check_fill(&c->tow.line_damping, bt_case_frame_damping(c)); // by the stiffness of both branches
+    bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
     bt_check_fill(&c->tow.vessel.free_resistance, 0.4 * c->tow.vessel.bollard_pull);
     bt_check_fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
 }

@@ -168,7 +168,8 @@ bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, ch
         snprintf(why, BT_WHY, "has no value; give one or remove the key");
         return false;
     }
-    bool absent = plain && !strcmp(text, "none") && k->preset && (k->preset[0] == '=' || !strcmp(k->preset, "none"));
+    bool absent = plain && !strcmp(text, "none") && k->preset &&
+                  (k->preset[0] == '=' || k->at_sea || !strcmp(k->preset, "none"));
     switch (k->type) {
     case BT_KEY_REAL:
         if (!absent) return read_real(k, base, text, why);

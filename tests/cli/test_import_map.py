@@ -174,7 +174,8 @@ def test_heading(tmp_path, heading):
     got, *_ = field(tmp_path, case)
     for ring, drawn in zip(got, RINGS):
         assert same_ring(ring, np.c_[drawn @ along, drawn @ left], 1e-5)
-    assert "frame" in field(tmp_path, changed(case, domain__frame="geographic"), code=3)
+    assert "frame" in field(tmp_path, changed(case, domain__frame="geographic", domain__ends="wall",
+                                              domain__sides="wall"), code=3)
 
 
 def test_the_program_reads_it(tmp_path):
@@ -533,7 +534,8 @@ def test_a_crowd_of_overlapping_floes(tmp_path):
     assert written == pytest.approx(union.area - lost, rel=0.01)
     changes = sum(c["area_after_m2"] - c["area_before_m2"] for c in record["changes"].values())
     assert written == pytest.approx(sum(map(plane_area, rings)) + changes, rel=1e-9)
-    case = changed(FRAMES["geographic"], domain={"frame": "geographic", "length": 480, "width": 480},
+    case = changed(FRAMES["geographic"], domain={"frame": "geographic", "length": 480, "width": 480, "ends": "wall",
+                                                 "sides": "wall"},
                    ice={"outlines": "floes.geojson", "nonconvex": "split", "thickness": 1})
     done = run(tmp_path, case)
     assert done.summary["outlines"]["read"] == len(got) and done.summary["warnings"] == []
