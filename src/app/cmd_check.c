@@ -10,6 +10,7 @@
 #include "run/setup.h"
 #include "bergtow/shape.h"
 #include "case/arch.h"
+#include "case/case_base.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
 #include "app/cmd.h"
@@ -377,7 +378,7 @@ int bt_cmd_check(int argc, char **argv)
     bt_case c;
     bt_field f;
     bt_errors err = {0};
-    if (bt_check_is_study(o.file.path)) {
+    if (bt_case_kind_of(o.file.path) == BT_FILE_STUDY) {
         const bt_status status = check_study(&o, &err);
         free(o.file.set);
         return bt_cmd_end(&bt_comm_alone, status, &err);

@@ -45,24 +45,6 @@ typedef struct {
     size_t n;
 } faults;
 
-bool bt_check_is_study(const char *path)
-{
-    struct stat st;
-    char *text = NULL;
-    size_t size;
-    bt_errors unheard = {0};
-    bool found = false;
-    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
-        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
-        bt_node *root = bt_tree_parse(text, size, path, &unheard);
-        found = bt_case_is_study(root);
-        bt_tree_free(root);
-    }
-    free(text);
-    bt_errors_free(&unheard);
-    return found;
-}
-
 // --- faults: what is wrong with many conditions is said once ---------------------------------------------------------
 
 static void take_faults(faults *f, int64_t condition, bt_errors *err)

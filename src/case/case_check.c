@@ -323,8 +323,7 @@ static bool check_body(const check *k, int *n, double *v)
         return false;
     box b = bounds_of(*n, v, c->body.x, c->body.y, c->body.yaw);
     const char *extent = c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
-    bool too_long = c->domain.ends != BT_BOUND_OPEN && b.x_max - b.x_min >= c->domain.length;
-    bool too_wide = c->domain.sides != BT_BOUND_OPEN && b.y_max - b.y_min >= c->domain.width;
+    const bool too_long = b.x_max - b.x_min >= c->domain.length, too_wide = b.y_max - b.y_min >= c->domain.width;
     if (too_long)
         bt_check_fault(k, extent,
                        "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length",
@@ -495,6 +494,7 @@ static void check_floe(const check *k, int index)
         bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
         return;
     }
+    if (isnan(f->thickness)) return; // that of the ice, which is asked for
     char text[BT_ICE_WHY];
     const bt_moments m = bt_shape_moments(n, v);
     const bt_ice_floe given = {n, v, f->x, f->y, f->yaw, f->thickness, NAN, 0};
@@ -576,6 +576,12 @@ void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
                       "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "
                       "unit wrong?",
                       c->body.mass > 0 ? "body.mass" : "body.density", ratio);
+    const double least = least_width(n, v);
+    if (c->body.draft > BT_ODD_DRAFT * least)
+        bt_errors_add(warnings,
+                      "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check "
+                      "both, and their units",
+                      c->body.draft, c->body.draft / least, least);
     if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
         bt_errors_add(warnings,
                       "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "

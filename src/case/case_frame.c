@@ -63,8 +63,8 @@ void bt_case_frame_clear(const bt_check *k, bool by_hand)
     if (!k->from || is_basin(k->c)) return;
     for (int i = 0; i < bt_n_case_keys; i++) {
         const bt_key *row = &bt_case_keys[i];
-        if (row->at_sea && row->type == BT_KEY_REAL && !bt_check_given(k, row->name) && is_used(k->c, row->name, by_hand))
-            *number(k->c, row) = NAN;
+        if (!row->at_sea || row->type != BT_KEY_REAL || bt_check_given(k, row->name)) continue;
+        if (is_used(k->c, row->name, by_hand)) *number(k->c, row) = NAN;
     }
 }
 

@@ -10,8 +10,8 @@
 /// NaN. by_hand: there are floes of the list without a thickness of their own.
 void bt_case_frame_clear(const bt_check *k, bool by_hand);
 
-/// Refuse a case that lacks such a value once others have followed from what it gives. ice.thickness beside outlines may
-/// stay NaN: the file says whether it is needed.
+/// Refuse a case that lacks such a value once others have followed from what it gives. ice.thickness beside outlines
+/// may stay NaN: the file says whether it is needed.
 void bt_case_frame_check(const bt_check *k, bool by_hand);
 
 /// Mean floe size of a case in the geographic frame that makes and reads no ice, m: that of its floes, or the size of

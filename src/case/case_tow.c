@@ -321,8 +321,21 @@ static void warn_of_overtaking(const bt_case *c, bt_errors *warnings)
                       c->tow.speed);
 }
 
+/// A run that is over before the tow has its speed. Of a programme the ramp is the time of its largest speed within
+/// the run.
+static void warn_of_short_run(const bt_case *c, bt_errors *warnings)
+{
+    if (c->tow.mode == BT_TOW_NONE || c->tow.n_programme > 0 || !(c->tow.speed > 0)) return;
+    if (c->tow.ramp < c->run.duration) return;
+    bt_errors_add(warnings,
+                  "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
+                  "lengthen run.duration, or give a shorter ramp",
+                  c->tow.ramp, c->run.duration);
+}
+
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
+    warn_of_short_run(c, warnings);
     if (c->tow.mode == BT_TOW_SPEED) warn_of_jerks(c, warnings);
     warn_of_overtaking(c, warnings);
     if (bt_case_start_is_slow(c)) return;

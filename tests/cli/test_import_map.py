@@ -190,11 +190,13 @@ def test_the_program_reads_it(tmp_path):
     (tmp_path / "case.yml").write_text(f"run: {{dt: 1 s, duration: 3 s}}\n{domain.strip()}\n{ice.strip()}\n"
                                        f"{water.strip()}\n"
                                        "body: {shape: none}\n")
-    done = run(tmp_path, tmp_path / "case.yml")
+    asked = call("check", tmp_path / "case.yml")
+    assert asked.returncode == 3 and "5 of 5 outlines have no property `thickness`" in asked.stderr
+    done = run(tmp_path, tmp_path / "case.yml", "--set", "ice.thickness=1")
     assert done.summary["warnings"] == [] and done.summary["outlines"]["read"] == 5 == reported["floes"]
     np.testing.assert_allclose(done.summary["concentration"], reported["concentration"], rtol=1e-6)
     np.testing.assert_allclose(done.summary["mean_size_m"], reported["mean_size_m"], rtol=1e-6)
-    got, *_ = field(tmp_path, yaml.safe_load((tmp_path / "case.yml").read_text()))
+    got, *_ = field(tmp_path, changed(yaml.safe_load((tmp_path / "case.yml").read_text()), ice__thickness=1))
     for ring, drawn in zip(got, RINGS[2::5], strict=True):  # the row in the middle, from west to east
         assert same_ring(ring, drawn[::-1, ::-1], 1e-3)
 
