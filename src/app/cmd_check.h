@@ -11,6 +11,8 @@
 typedef struct bt_check_ice {
     double count, size, thickness, concentration; ///< number, mean diameter m, mean thickness m, area fraction
     double corners; ///< of all floes
+    double split, parts; ///< floes that are not convex, and their convex parts
+    double made;         ///< floes that are made
 } bt_check_ice;
 
 /// The time step against the rule in cmd_check.c.

@@ -105,7 +105,7 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
         *x = (numbers){n.count,
                        (double)bt_case_steps(&c),
                        bt_check_seconds(&c, &n),
-                       bt_cost_memory(&c, n.count, ranks.size, ranks.size),
+                       bt_cost_memory(&c, n.count, n.parts, ranks.size, ranks.size),
                        bt_cost_member(&c, &disk),
                        step.contact && step.floes,
                        (int)warnings.n,
