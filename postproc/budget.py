@@ -95,7 +95,7 @@ def those_there(e):
             numbers(e, of)
             out.append(of)
         except RunError as error:
-            print(f"budget.py: left out: {of}: {error.reason}")
+            print(f"bergtow budget: left out: {of}: {error.reason}")
     return out
 
 
@@ -179,7 +179,8 @@ def read_converge(path, folder):
 
 
 def main(argv=None):
-    p = argparse.ArgumentParser(prog="budget", description="Find out how much of the scatter of a number is of the "
+    p = argparse.ArgumentParser(prog="bergtow budget",
+                                description="Find out how much of the scatter of a number is of the "
                                 "fields, of each parameter, and of the computation.")
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")

@@ -298,7 +298,8 @@ def share(text):
 
 
 def arguments(argv):
-    p = argparse.ArgumentParser(prog="capability", description="Find the speed that a tow reaches, and the ice that "
+    p = argparse.ArgumentParser(prog="bergtow capability",
+                                description="Find the speed that a tow reaches, and the ice that "
                                 "stops it or the vessel that is enough.")
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/capability-CASE; runs are kept "

@@ -145,7 +145,7 @@ def save(figure, path, force=False):
 def guarded(main):
     """Run main() and leave the program with the exit code of what happened. What asks it to stop does so as Ctrl-C, for
     the runs that it has started to end with checkpoints; nohup holds."""
-    name = Path(sys.argv[0]).name
+    name = lacking.program()
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)

@@ -315,7 +315,8 @@ def names_of(text):
 
 
 def main(argv=None):
-    p = argparse.ArgumentParser(description="Find out what of the computation a result depends on.")
+    p = argparse.ArgumentParser(prog="bergtow converge",
+                                description="Find out what of the computation a result depends on.")
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/converge-CASE; runs are kept there, "
                    "and the same call takes those of the same case file and program")

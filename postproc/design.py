@@ -177,7 +177,8 @@ def run_case(work, a, case):
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
         need = a.budget + max(0.0, (FEW - n) * rate - max(0.0, end - time.monotonic())) / 60
-        print(f"design.py: warning: {n} fields say nothing of the scatter between them; {FEW} need some {need:.0f} min "
+        print(f"bergtow design: warning: {n} fields say nothing of the scatter between them; {FEW} need some "
+              f"{need:.0f} min "
               "(--budget), or a shorter run (--set run.duration=1h)", file=sys.stderr)
 
 
@@ -212,7 +213,7 @@ def make_replay(work, a, left):
                 str(work.jobs), "--set", f"output.frame_interval={step:g}s"]
         done = subprocess.run(call, capture_output=True, text=True)
         if done.returncode:
-            print(f"design.py: warning: no replay: {(done.stderr.strip().splitlines() or ['no reason given'])[0]}",
+            print(f"bergtow design: warning: no replay: {(done.stderr.strip().splitlines() or ['no reason given'])[0]}",
                   file=sys.stderr)
         else:
             report.main([folder, "-o", str(a.output / "replay.html"), *["--force"] * a.force])
@@ -229,7 +230,8 @@ def concentrations(text):
 
 
 def arguments(argv):
-    p = argparse.ArgumentParser(description="From a case or a study to the report of the design tow force: "
+    p = argparse.ArgumentParser(prog="bergtow design",
+                                description="From a case or a study to the report of the design tow force: "
                                 "report.html and report.pdf.")
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "

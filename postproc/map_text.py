@@ -110,7 +110,7 @@ def floe_lines(numbers):
         lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle {seen}, and bergtow takes the rest "
                      "for water: choose a smaller one with --box")
     if not numbers["with_thickness"]:
-        lines.append("thickness: no floe has one; they get ice.thickness of the case")
+        lines.append("thickness: no floe has one; give ice.thickness in the case")
     else:
         lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m in "
                      "the mean")
@@ -131,7 +131,7 @@ def case_lines(path, numbers, heading, margin, latitude=None):
     digits = max(1, 3 - math.floor(math.log10(min(x1 - x0, y1 - y0))))  # the region to a thousandth
     return ["in a case beside it:",
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
-            f"width: {size[1]:.0f} m}}",
+            f"width: {size[1]:.0f} m" + (", ends: wall, sides: wall}" if heading is None else "}"),
             f"  ice: {{outlines: {path.name}, x_min: {x0:.{digits}f} m, x_max: {x1:.{digits}f} m, "
             f"y_min: {y0:.{digits}f} m, y_max: {y1:.{digits}f} m" + (", nonconvex: split}" if bays else "}"),
             *([] if latitude is None else [f"  water: {{latitude: {latitude:.4g} deg}}"])]

@@ -91,7 +91,8 @@ def angle(text):
 
 
 def arguments(argv):
-    p = argparse.ArgumentParser(description="Make floe outlines for ice.outlines of a map: shapefile, GeoPackage, "
+    p = argparse.ArgumentParser(prog="bergtow outlines",
+                                description="Make floe outlines for ice.outlines of a map: shapefile, GeoPackage, "
                                 "GeoJSON, ..., or an image of labels (GeoTIFF, PNG with a world file, .npy).")
     p.add_argument("map", metavar="MAP", type=Path)
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")

@@ -71,7 +71,7 @@ REBOUNDS = {
     "body": {"shape": "none"},
     "guard": {"energy": 0},
 }
-GEO_THRUST = {"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000}
+GEO_THRUST = {"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000, "line_damping": 100}
 ORIGIN = {"origin_lon": 18.3, "origin_lat": 76.2}
 PLANE = {"origin_east": 560123.5, "origin_north": 8490321.25}
 DRAG = {"water_form": 0.7, "water_skin": 0.004, "air_form": 0.5, "air_skin": 0.003}
@@ -167,7 +167,8 @@ SCENES = {
                                             "nonconvex": "split", **ORIGIN}, tow__speed=0.4),
     "outlines_plane": changed(SHORT, ice={"outlines": "plane.geojson", "outlines_crs": "plane", "nonconvex": "split",
                                           **PLANE}, tow__speed=0.4),
-    "outlines_frame": changed(SHORT, domain={"length": 15, "width": 8, "x0": 0, "y0": -4, "frame": "geographic"}, ice={
+    "outlines_frame": changed(SHORT, domain={"length": 15, "width": 8, "x0": 0, "y0": -4, "frame": "geographic",
+                                                 "ends": "wall", "sides": "wall"}, ice={
         "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
     "outlines_metres": changed(SHORT, ice={"outlines": "frame.geojson", "outlines_crs": "metres", "nonconvex": "hull"}),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),

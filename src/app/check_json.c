@@ -52,11 +52,12 @@ static void write_cost(bt_json *j, const bt_case *c, const bt_comm *comm, const 
 {
     const bt_cost_disk d = bt_cost_disk_of(c, run->count, run->corners, comm->size);
     bt_json_open(j, "cost", '{');
-    bt_json_number(j, "memory_b", bt_cost_memory(c, run->count, comm->size, comm->ranks_here));
+    bt_json_number(j, "memory_b", bt_cost_memory(c, run->count, run->parts, comm->size, comm->ranks_here));
     bt_json_number(j, "frames", bt_cost_frames(c));
     bt_json_number(j, "disk_b", bt_cost_left(&d));
     bt_json_number(j, "disk_while_running_b", d.most);
     bt_json_number(j, "core_time_s", bt_check_seconds(c, run));
+    bt_json_number(j, "making_of_ice_s", bt_cost_making(c, run->made));
     bt_json_close(j, '}');
 }
 

@@ -20,6 +20,7 @@
 static bt_check_ice ice_of_case(const bt_case *c)
 {
     return (bt_check_ice){.count = bt_case_expected_floes(c) + c->n_floes,
+                          .made = bt_case_expected_floes(c),
                           .size = bt_case_mean_size(c),
                           .thickness = c->ice.thickness,
                           .concentration = c->ice.concentration};
@@ -40,6 +41,7 @@ static bt_check_ice ice_of(const bt_case *c, const bt_field *f)
 {
     bt_check_ice n = bt_case_reads_field(c) ? ice_of_field(c, f) : ice_of_case(c);
     n.corners = bt_cost_corners(c, f, n.count);
+    n.split = (double)f->outlines.split, n.parts = (double)f->outlines.parts;
     return n;
 }
 
@@ -59,7 +61,9 @@ bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
 
 double bt_check_seconds(const bt_case *c, const bt_check_ice *n)
 {
-    return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration);
+    const bt_cost_ice ice = {
+        .floes = n->count, .concentration = n->concentration, .split = n->split, .parts = n->parts};
+    return bt_cost_making(c, n->made) + bt_cost_stepping(c, &ice);
 }
 
 // --- refusals and warnings -------------------------------------------------------------------------------------------

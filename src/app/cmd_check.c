@@ -10,6 +10,7 @@
 #include "run/setup.h"
 #include "bergtow/shape.h"
 #include "case/arch.h"
+#include "case/case_base.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
 #include "app/cmd.h"
@@ -269,12 +270,15 @@ static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice
     const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size),
                        several = bt_cost_disk_of(c, n->count, n->corners, 2);
     char a[32], b[32], e[32];
-    printf("memory               about %s\n", bytes(bt_cost_memory(c, n->count, comm->size, comm->ranks_here), a));
+    printf("memory               about %s\n", bytes(bt_cost_memory(c, n->count, n->parts, comm->size, comm->ranks_here), a));
     printf("frames               %.0f\n", bt_cost_frames(c));
     printf("disk                 about %s, up to %s while it runs", bytes(bt_cost_left(&d), a), bytes(d.most, b));
     if (comm->size == 1) printf("; %s from several ranks, which do not compress", bytes(bt_cost_left(&several), e));
-    printf("\nwall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n",
+    printf("\nwall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration",
            seconds, 1e6 * per_step);
+    const double making = bt_cost_making(c, n->made);
+    if (making > 0) printf("; the making of ice %.2g s of it", making);
+    printf(")\n");
 }
 
 static const char *warned(size_t n, char out[64])
@@ -377,7 +381,7 @@ int bt_cmd_check(int argc, char **argv)
     bt_case c;
     bt_field f;
     bt_errors err = {0};
-    if (bt_check_is_study(o.file.path)) {
+    if (bt_case_kind_of(o.file.path) == BT_FILE_STUDY) {
         const bt_status status = check_study(&o, &err);
         free(o.file.set);
         return bt_cmd_end(&bt_comm_alone, status, &err);

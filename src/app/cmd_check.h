@@ -11,6 +11,8 @@
 typedef struct bt_check_ice {
     double count, size, thickness, concentration; ///< number, mean diameter m, mean thickness m, area fraction
     double corners; ///< of all floes
+    double split, parts; ///< floes that are not convex, and their convex parts
+    double made;         ///< floes that are made
 } bt_check_ice;
 
 /// The time step against the rule in cmd_check.c.
@@ -42,9 +44,6 @@ double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
 void bt_check_print_json(const char *path, const bt_case *c, const struct bt_comm *comm, const bt_check_ice *n,
                          const bt_check_ice *run, const bt_errors *warnings);
 
-/// Has the file a key `base` at its top, as no case has? False where it cannot be read. Pipes, which can be read only
-/// once, are cases.
-bool bt_check_is_study(const char *path);
 /// Check a study and the case of the first member of each condition; print what follows when all are valid, on so many
 /// ranks. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err);

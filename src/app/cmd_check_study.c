@@ -45,24 +45,6 @@ typedef struct {
     size_t n;
 } faults;
 
-bool bt_check_is_study(const char *path)
-{
-    struct stat st;
-    char *text = NULL;
-    size_t size;
-    bt_errors unheard = {0};
-    bool found = false;
-    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
-        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
-        bt_node *root = bt_tree_parse(text, size, path, &unheard);
-        found = bt_case_is_study(root);
-        bt_tree_free(root);
-    }
-    free(text);
-    bt_errors_free(&unheard);
-    return found;
-}
-
 // --- faults and warnings: what is wrong with many conditions is said once --------------------------------------------
 
 /// Of warnings of one code, which differ in numbers, the first stands for all.
@@ -129,7 +111,7 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
         *x = (numbers){n.count,
                        (double)bt_case_steps(&c),
                        bt_check_seconds(&c, &n),
-                       bt_cost_memory(&c, n.count, ranks.size, ranks.size),
+                       bt_cost_memory(&c, n.count, n.parts, ranks.size, ranks.size),
                        bt_cost_member(&c, &disk),
                        step.contact && step.floes,
                        warnings->n > 0,

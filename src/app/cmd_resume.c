@@ -5,6 +5,7 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/largest.h"
+#include "case/case_base.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +38,14 @@ static void take_place(options *o, char *arg)
     o->dir = bt_file_folder(arg);
 }
 
+static void refuse_case(const struct argp_state *state, const char *path)
+{
+    const bt_file_kind kind = bt_case_kind_of(path);
+    if (kind == BT_FILE_CASE) argp_error(state, "%s: this is a case: bergtow run %s", path, path);
+    if (kind == BT_FILE_STUDY)
+        argp_error(state, "%s: this is a study, which its own call resumes: bergtow ensemble %s", path, path);
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *o = state->input;
@@ -48,6 +57,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case ARGP_KEY_ARG:
         if (o->dir) argp_error(state, "%s: one folder at a time; options with a value are written --option value", arg);
         take_place(o, arg);
+        if (o->file) refuse_case(state, arg);
         return 0;
     case ARGP_KEY_END:
         if (!o->dir) argp_error(state, "no folder given; name the result folder of a run, as in out/basin-80");

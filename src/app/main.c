@@ -6,6 +6,7 @@
 #include "revision.h"
 #include "base/cores.h"
 #include "base/suggest.h"
+#include "case/case_base.h"
 #include "output/quantity_list.h"
 
 #include <omp.h>
@@ -186,6 +187,13 @@ static int bergtow(int argc, char **argv)
     if (word[0] == '-')
         return refuse_word("option", word,
                            (const char *const[]){"--help", "--version", "--list-keys", "--list-quantities", NULL});
+    const bt_file_kind kind = bt_case_kind_of(word);
+    if (kind != BT_FILE_OTHER) {
+        const bool study = kind == BT_FILE_STUDY;
+        fprintf(stderr, "bergtow: %s: this is a %s: bergtow %s %s\n", word, study ? "study" : "case",
+                study ? "ensemble" : "run", word);
+        return BT_ERR_USAGE;
+    }
     const char *names[N_COMMANDS + 1] = {NULL};
     for (int i = 0; i < N_COMMANDS; i++) names[i] = commands[i].name;
     return refuse_word("command", word, names);

@@ -150,6 +150,14 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
         return false;
     }
     const char *symbol = text + n;
+    if (*symbol == ',' && isdigit((unsigned char)symbol[1])) {
+        const bool decimals = !memchr(text, '.', n) && strspn(symbol + 1, "0123456789") != 3; // else thousands, perhaps
+        char mended[64] = "";
+        if (decimals) snprintf(mended, sizeof mended, ", as in %.*s.%.20s", n > 20 ? 20 : (int)n, text, symbol + 1);
+        snprintf(why, BT_WHY, "%.40s has a comma; write decimals with a point%s, and no sign between thousands", text,
+                 mended);
+        return false;
+    }
     while (isspace((unsigned char)*symbol)) symbol++;
     size_t n_symbol = strlen(symbol);
     while (n_symbol && isspace((unsigned char)symbol[n_symbol - 1])) n_symbol--;

@@ -15,6 +15,9 @@ static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.
 /// δ of arch.h, from this concentration on.
 static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, {0.95, 0.003}};
 
+/// A disc is a polygon of its area, and 0.08 % wider than its length: thirty of its lengths are thirty widths.
+static const double OUTLINE = 1e-3;
+
 /// Ice as made misses the concentration asked for in the last digits, and what is printed as 90 % has the rule of 90 %.
 static bool reaches(double concentration, double limit) { return concentration >= limit - 0.005; }
 
@@ -53,6 +56,7 @@ static bt_arch beside_tow(const bt_case *c, const pair *p, double course, double
     for (size_t k = 0; k < sizeof locked / sizeof *locked; k++)
         if (a.needed > 0 && way > 0 && reaches(concentration, locked[k].concentration))
             a.needed = bt_max(a.needed, ceil(2 * sqrt(way / (BT_PI * locked[k].slack * across))));
+    if (a.bodies < a.needed && a.bodies > a.needed * (1 - OUTLINE)) a.bodies = a.needed;
     a.possible = a.bodies < a.needed;
     return a;
 }

@@ -7,6 +7,7 @@
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/fileio.h"
 #include "base/largest.h"
@@ -49,6 +50,33 @@ bool bt_case_is_study(const bt_node *root)
         of_cases = of_cases || is_of_cases(word);
     }
     return !of_cases;
+}
+
+bt_file_kind bt_case_kind(const bt_node *root)
+{
+    if (!root || root->kind != BT_NODE_MAP) return BT_FILE_OTHER;
+    if (bt_case_is_study(root)) return BT_FILE_STUDY;
+    for (int i = 0; i < root->n; i++)
+        if (is_of_cases(root->key[i])) return BT_FILE_CASE;
+    return BT_FILE_OTHER;
+}
+
+bt_file_kind bt_case_kind_of(const char *path)
+{
+    struct stat st;
+    char *text = NULL;
+    size_t size;
+    bt_errors unheard = {0};
+    bt_file_kind kind = BT_FILE_OTHER;
+    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
+        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
+        bt_node *root = bt_tree_parse(text, size, path, &unheard);
+        kind = bt_case_kind(root);
+        bt_tree_free(root);
+    }
+    free(text);
+    bt_errors_free(&unheard);
+    return kind;
 }
 
 static bt_case_file *add(bt_case_files *f, char *path, char *text, size_t size)

@@ -34,6 +34,12 @@ char *bt_case_files_text(const bt_case_files *f);
 /// other key of studies, or none of cases (`report` is of both).
 bool bt_case_is_study(const bt_node *root);
 
+/// What a file holds, by its keys; other where it cannot be read. Pipes, which can be read only once, are not read.
+typedef enum { BT_FILE_OTHER, BT_FILE_CASE, BT_FILE_STUDY } bt_file_kind;
+bt_file_kind bt_case_kind_of(const char *path);
+/// The same of a tree.
+bt_file_kind bt_case_kind(const bt_node *root);
+
 extern const bt_key bt_base_key; ///< the key `base` of a case; of the file, and not of what it says
 
 #endif

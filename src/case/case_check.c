@@ -8,6 +8,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
+#include "case/case_frame.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
@@ -98,6 +99,7 @@ static void follow(const check *k)
         bt_check_fill(&f->thickness, c->ice.thickness);
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
+    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
 }
@@ -248,34 +250,6 @@ static void check_sizes(const check *k)
                        BT_MOST_FLOES);
 }
 
-// The defaults of ice and body are those of a model basin. At full scale a number that the user did not give would look
-// like an answer.
-/// by_hand: there are floes of the list without a thickness of their own.
-static void check_geographic(const check *k, bool by_hand)
-{
-    const bt_case *c = k->c;
-    if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
-    const bool read = bt_case_reads_field(c),
-               made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0),
-               body = c->body.shape != BT_BODY_ABSENT;
-    const struct {
-        const char *key, *what;
-        bool needed;
-    } keys[] = {{"ice.concentration", "area fraction of ice, as in 50 %, or 0 for open water", !read},
-                // that asks for both its ends
-                {"ice.size", "mean floe diameter, as in 30 m", made && c->ice.size_law != BT_SIZE_POWER},
-                {"ice.thickness", "mean floe thickness, as in 1 m", made || by_hand},
-                {"body.length", "length of the towed body, as in 80 m, or set body.shape: none",
-                 body && c->body.shape != BT_BODY_POLYGON},
-                {"body.draft", "its depth below the waterline, as in 60 m, or set body.shape: none", body}};
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        if (keys[i].needed && !bt_check_given(k, keys[i].key))
-            bt_check_fault(k, keys[i].key,
-                           "missing, and in domain.frame: geographic it has no default (that would be a model "
-                           "basin's); add it (%s)",
-                           keys[i].what);
-}
-
 static void check_outlines(const check *k)
 {
     const bt_case *c = k->c;
@@ -350,8 +324,7 @@ static bool check_body(const check *k, int *n, double *v)
         return false;
     box b = bounds_of(*n, v, c->body.x, c->body.y, c->body.yaw);
     const char *extent = c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
-    bool too_long = c->domain.ends != BT_BOUND_OPEN && b.x_max - b.x_min >= c->domain.length;
-    bool too_wide = c->domain.sides != BT_BOUND_OPEN && b.y_max - b.y_min >= c->domain.width;
+    const bool too_long = b.x_max - b.x_min >= c->domain.length, too_wide = b.y_max - b.y_min >= c->domain.width;
     if (too_long)
         bt_check_fault(k, extent,
                        "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length",
@@ -522,6 +495,7 @@ static void check_floe(const check *k, int index)
         bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
         return;
     }
+    if (isnan(f->thickness)) return; // that of the ice, which is asked for
     char text[BT_ICE_WHY];
     const bt_moments m = bt_shape_moments(n, v);
     const bt_ice_floe given = {n, v, f->x, f->y, f->yaw, f->thickness, NAN, 0};
@@ -548,21 +522,22 @@ static void check_floe(const check *k, int index)
                       axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
 }
 
-bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
+bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
 {
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
     bool by_hand = false;
     for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || isnan(c->floes[i].thickness);
+    bt_case_frame_clear(&k, by_hand);
     bt_case_tow_course(&k);
     follow(&k);
     bt_case_tow_follow(&k);
     bt_status loaded = bt_case_load_tables(c, err);
     size_t at_files = err->n;
+    bt_case_frame_check(&k, by_hand);
     check_run(&k);
     check_domain(&k);
     check_region(&k);
-    check_geographic(&k, by_hand);
     check_sizes(&k);
     check_outlines(&k);
     bt_case_check_idle(&k);
@@ -602,6 +577,12 @@ void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
                       "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "
                       "unit wrong?",
                       c->body.mass > 0 ? "body.mass" : "body.density", ratio);
+    const double least = least_width(n, v);
+    if (c->body.draft > BT_ODD_DRAFT * least)
+        bt_errors_add(warnings,
+                      "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check "
+                      "both, and their units",
+                      c->body.draft, c->body.draft / least, least);
     if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
         bt_warn(warnings, BT_WARN_LONG_IMPACT,
                       "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "

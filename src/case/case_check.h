@@ -9,9 +9,10 @@
 #include "case/case_derived.h"
 #include "case/case_faults.h"
 
-/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err. Reads the
+/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL; those of values that are missing are marked
+/// as faulty. Appends every fault to err. Reads the
 /// tables that the case names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
-bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
+bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err);
 
 /// The default of a number that is not given.
 static inline void bt_check_fill(double *member, double value)
@@ -43,8 +44,11 @@ void bt_case_lead_follow(bt_case *c, int n, const double *v);
 void bt_case_check_lead(const bt_check *k);
 
 #define BT_ODD_MASS 4.0     ///< mass / displaced water, or its inverse, beyond which a unit may be wrong, assumed
+/// draft / least width of the waterline beyond which a body would hardly stay upright, assumed: a column of ice of
+/// uniform density does up to 0.94 (disc), bergs with a foot beyond that
+#define BT_ODD_DRAFT 2.0
 #define BT_LONG_IMPACT 20.0 ///< time steps of a collision beyond which one may be, assumed
-/// Mass of the body, and duration of its collisions, that no body may have.
+/// Mass and draft of the body, and duration of its collisions, that no body may have.
 void bt_case_warn_body(const bt_case *c, bt_errors *warnings);
 
 /// Rows of the tables of current and wind that are closer than a step, which does not see what is between.

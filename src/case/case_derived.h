@@ -25,6 +25,9 @@ static inline double bt_case_rise(double ice_density, double water_density)
 /// Is the ice read from a file, not made?
 static inline bool bt_case_reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
 
+/// Is ice made? So of a concentration that is not known yet, too.
+static inline bool bt_case_makes_ice(const bt_case *c) { return !bt_case_reads_field(c) && c->ice.concentration != 0; }
+
 /// Does the ice depend on ice.seed? What is read does where outlines without a thickness of their own draw one.
 bool bt_case_ice_is_random(const bt_case *c);
 

@@ -22,7 +22,7 @@ void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char 
 /// A check under way.
 typedef struct bt_check {
     bt_case *c;
-    const bt_origin *from; ///< [bt_n_case_keys], or NULL
+    bt_origin *from; ///< [bt_n_case_keys], or NULL
     bt_errors *err;
 } bt_check;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Numbers that follow from other keys where they are not given.
 #include "case/case_check.h"
+#include "case/case_frame.h"
 
 #include "bergtow/shape.h"
 #include "base/largest.h"
@@ -27,6 +28,7 @@ void bt_case_fill_impact(bt_case *c)
 {
     bt_check_fill(&c->impact.duration, c->run.dt);
     bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
+    bt_check_fill(&c->solver.rest_speed, bt_case_frame_rest_speed(c));
 }
 
 void bt_case_fill(bt_case *c)
@@ -34,6 +36,7 @@ void bt_case_fill(bt_case *c)
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
     bt_case_fill_scene(c);
+    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
     bt_case_tow_follow(&(bt_check){.c = c});
     bt_case_tow_hull(c, n, v);
     bt_case_tow_ramp(c);

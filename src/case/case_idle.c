@@ -116,6 +116,17 @@ static bt_case with_default(const bt_case *c, const bt_key *k)
     return d;
 }
 
+bool bt_case_is_unused(const bt_case *c, const char *key)
+{
+    idle rules[RULES];
+    char name[BT_LONGEST_KEY];
+    list(c, rules);
+    for (int i = 0; i < RULES; i++)
+        for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
+            if (!strcmp(name, key)) return true;
+    return false;
+}
+
 bool bt_case_changed(const bt_case *c, const char *key)
 {
     const bt_key *k = row_of(key);

@@ -17,6 +17,9 @@ void bt_case_mark_idle(const bt_case *c, bool *idle_key);
 /// Give a key of a number or a choice its default.
 void bt_case_put_default(bt_case *c, int key);
 
+/// Has this key no effect, whatever its value?
+bool bt_case_is_unused(const bt_case *c, const char *key);
+
 /// Has a key of a number or a choice another value than its default, which others may set?
 bool bt_case_changed(const bt_case *c, const char *key);
 

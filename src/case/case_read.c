@@ -12,6 +12,7 @@
 #include "base/tree.h"
 #include "case/value.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -95,6 +96,20 @@ static void give(reader *r, int k, const bt_node *value, int line)
     }
 }
 
+/// A number with a decimal comma within { } is cut in two: `thickness: 0` and a key `8 m` without a value. section: of
+/// the map, or "".
+static bool is_after_comma(reader *r, const bt_node *map, int i, const char *section)
+{
+    const bt_node *left = i > 0 ? map->item[i - 1] : NULL;
+    const size_t n = left && left->kind == BT_NODE_SCALAR ? strlen(left->text) : 0;
+    if (!n || !isdigit((unsigned char)left->text[n - 1]) || !isdigit((unsigned char)*map->key[i]) ||
+        !is_nothing(map->item[i]))
+        return false;
+    bt_errors_add(r->err, "%s:%d: %s%s%.60s: %.20s,%.20s has a comma; write decimals with a point, as in %.20s.%.20s",
+                  r->path, map->key_line[i], section, *section ? "." : "", map->key[i - 1], left->text, map->key[i], left->text, map->key[i]);
+    return true;
+}
+
 // Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed:
 // 1).
 static void walk(reader *r, const bt_node *map, const char *prefix)
@@ -111,6 +126,8 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
             if (!r->floes) r->floes = value, r->floes_path = r->path;
         } else if (!strcmp(name, "base")) {
             continue; // bt_case_files_read has followed it
+        } else if (is_after_comma(r, map, i, prefix)) {
+            continue;
         } else if (!bt_schema_is_section(name)) {
             unknown_key(r, bt_case_keys, bt_n_case_keys, line, "", name);
         } else if (value->kind == BT_NODE_MAP) {
@@ -208,6 +225,8 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
     for (int i = 0; i < map->n; i++) {
         int k = bt_schema_find(bt_floe_keys, bt_n_floe_keys, map->key[i]);
         if (k < 0) {
+            snprintf(where, sizeof where, "floes[%d]", index);
+            if (is_after_comma(r, map, i, where)) continue;
             unknown_key(r, bt_floe_keys, bt_n_floe_keys, map->key_line[i], item, map->key[i]);
             continue;
         }

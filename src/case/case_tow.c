@@ -10,6 +10,7 @@
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
+#include "case/case_frame.h"
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
@@ -210,12 +211,14 @@ void bt_case_tow_follow(const bt_check *k)
     }
     bt_case_tow_course(k);
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-    bt_check_fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
+    const bool named = c->tow.line.type != BT_ROPE_NUMBERS, at_sea = c->domain.frame == BT_FRAME_GEOGRAPHIC;
+    bt_check_fill(&c->tow.line_stiffness, named ? rope.stiffness : at_sea && has_line(c) ? NAN : 10e3);
     bt_check_fill(&c->tow.line.breaking_load, rope.breaking);
     bt_check_fill(&c->tow.branch2.length, c->tow.line_length);
     bt_check_fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
-    bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
     bt_check_fill(&c->tow.branch2.breaking_load, c->tow.line.breaking_load);
+    bt_check_fill(&c->tow.line_damping, bt_case_frame_damping(c)); // by the stiffness of both branches
+    bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
     bt_check_fill(&c->tow.vessel.free_resistance, 0.4 * c->tow.vessel.bollard_pull);
     bt_check_fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
 }
@@ -319,8 +322,21 @@ static void warn_of_overtaking(const bt_case *c, bt_errors *warnings)
                       c->tow.speed);
 }
 
+/// A run that is over before the tow has its speed. Of a programme the ramp is the time of its largest speed within
+/// the run.
+static void warn_of_short_run(const bt_case *c, bt_errors *warnings)
+{
+    if (c->tow.mode == BT_TOW_NONE || c->tow.n_programme > 0 || !(c->tow.speed > 0)) return;
+    if (c->tow.ramp < c->run.duration) return;
+    bt_errors_add(warnings,
+                  "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
+                  "lengthen run.duration, or give a shorter ramp",
+                  c->tow.ramp, c->run.duration);
+}
+
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
+    warn_of_short_run(c, warnings);
     if (c->tow.mode == BT_TOW_SPEED) warn_of_jerks(c, warnings);
     warn_of_overtaking(c, warnings);
     if (bt_case_start_is_slow(c)) return;

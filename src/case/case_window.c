@@ -45,7 +45,8 @@ void bt_case_window_follow(bt_case *c)
 static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256])
 {
     const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length;
-    const double floe = bt_case_mean_size(c);
+    const bool ice = bt_case_makes_ice(c) || bt_case_reads_field(c) || c->n_floes > 0;
+    const double floe = ice ? bt_case_mean_size(c) : 0;
     if (c->domain.ends != BT_BOUND_MOVING) {
         // the resolved file has every key
         if (!ahead_given || fabs(ahead - bt_case_window_ahead(c)) <= 1e-9 * length) return NULL;

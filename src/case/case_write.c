@@ -80,8 +80,9 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
             range = options;
         }
         const char *preset = k->preset ? k->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
-        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc,
-                rule ? "; default: " : "", rule ? rule + 2 : "");
+        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc,
+                rule ? "; default: " : "", rule ? rule + 2 : "",
+                k->at_sea ? "; no default in the geographic frame" : "");
     }
 }
 
@@ -133,6 +134,7 @@ static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
         bt_json_bool(j, "required", !k->preset);
         bt_json_string(j, "default", rule ? NULL : k->preset);
         bt_json_string(j, "follows", rule ? k->preset + 2 : NULL);
+        bt_json_bool(j, "default_at_sea", k->preset && !k->at_sea);
         if (number) bt_json_string(j, "unit", k->type == BT_KEY_INT ? "" : bt_units_bare(k->unit));
         if (number) json_range(j, k);
         if (k->type == BT_KEY_CHOICE) {

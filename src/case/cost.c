@@ -14,7 +14,10 @@
 #include "base/largest.h"
 
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
-                    BASE_BYTES = 20e6;
+                    BYTES_PER_PART = 450, BASE_BYTES = 30e6;
+// The history grows by doubling. HDF5 keeps what it knows of each entry of the series and of each frame, up to a bound.
+static const double GROWN = 1.25, BYTES_PER_ENTRY = 810, MOST_OF_ENTRIES = 110e6, BYTES_PER_FRAME = 140e3,
+                    MOST_OF_FRAMES = 60e6;
 // on rank 0 while it writes one: contacts on the way, and a column of the bodies
 static const double CHECKPOINT_BYTES_PER_FLOE = 300;
 
@@ -31,6 +34,11 @@ static const double CHECKPOINT_BASE = 135e3, CHECKPOINT_FLOE = 180, CHECKPOINT_C
 static const double TEXTS = 38e3, XDMF_FRAME = 4440, XDMF_LINE = 880;
 static const double VORONOI_CORNERS = 5.6;
 
+static double entries_of(const bt_case *c)
+{
+    return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every));
+}
+
 double bt_cost_floe_step(double concentration)
 {
     const double x = bt_min(0.95, bt_max(0, concentration));
@@ -39,11 +47,40 @@ double bt_cost_floe_step(double concentration)
     return 2.2e-6 * bt_pow(2.1, (x - 0.8) / 0.15);
 }
 
+// --- time ------------------------------------------------------------------------------------------------------------
+
+// Of any step; of an entry of the series, with its share of the flushes; of a frame, and of a floe in it; of the start,
+// s.
+static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 0.3e-6, START = 0.03;
+// Of a convex part of a floe, and of a pair of parts of two floes that are near each other, each step, s.
+static const double PART = 0.05e-6, PAIR = 6e-9;
+
+double bt_cost_making(const bt_case *c, double floes)
+{
+    if (!bt_case_makes_ice(c)) return 0;
+    const double x = c->ice.concentration, loose = bt_min(1, bt_max(0, (0.9 - x) / 0.3)); // 1 up to 60 %, 0 from 90 % on
+    const double shape = c->ice.shape == BT_ICE_RECTANGLES ? 0.75
+                         : c->ice.shape == BT_ICE_POLYGONS ? bt_min(2.2, bt_max(0.8, 7 * x - 0.6))
+                                                           : 1;
+    return 1e-3 * shape * (0.09 + 0.02 * c->ice.shake * (0.4 + 0.6 * loose)) * floes;
+}
+
+double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice)
+{
+    const double parts = PART * ice->parts +
+                         (ice->split > 0 ? PAIR * ice->concentration * ice->parts * ice->parts / ice->split : 0);
+    return START + (double)bt_case_steps(c) * (STEP + ice->floes * bt_cost_floe_step(ice->concentration) + parts) +
+           ENTRY * entries_of(c) + bt_cost_frames(c) * (FRAME + FRAME_FLOE * ice->floes);
+}
+
 double bt_cost_seconds(const bt_case *c)
 {
-    const double floes = bt_case_expected_floes(c) + c->n_floes + 1;
-    return floes * (double)bt_case_steps(c) * bt_cost_floe_step(c->ice.concentration);
+    const double made = bt_case_expected_floes(c);
+    const bt_cost_ice ice = {.floes = made + c->n_floes + 1, .concentration = c->ice.concentration};
+    return bt_cost_making(c, made) + bt_cost_stepping(c, &ice);
 }
+
+// --- memory ----------------------------------------------------------------------------------------------------------
 
 /// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel
 /// (panel_blocks.h).
@@ -54,10 +91,13 @@ static double steps_kept(const bt_case *c)
     return BYTES_PER_STEP * steps + (panels ? BT_COST_PANEL_BYTES * blocks * (double)c->impact.panels : 0);
 }
 
-double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
+double bt_cost_memory(const bt_case *c, double n_floes, double parts, int size, int ranks_here)
 {
-    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here +
-           CHECKPOINT_BYTES_PER_FLOE * n_floes + steps_kept(c);
+    return (BASE_BYTES + (BYTES_PER_FLOE * n_floes + BYTES_PER_PART * parts) / size +
+            FIELD_BYTES_PER_FLOE * n_floes) * ranks_here +
+           CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(c) +
+           bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(c)) +
+           bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(c));
 }
 
 double bt_cost_corners(const bt_case *c, const bt_field *f, double n)
@@ -75,11 +115,6 @@ double bt_cost_corners(const bt_case *c, const bt_field *f, double n)
 static double of_frame(double bytes, double left, bool packed)
 {
     return packed && bytes > LEAST_PACKED ? bytes * left + INDEX : bytes;
-}
-
-static double entries_of(const bt_case *c)
-{
-    return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every));
 }
 
 double bt_cost_frames(const bt_case *c)
@@ -106,7 +141,8 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const bool on_the_way =
         (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
         (c->output.checkpoint_wall > 0 &&
-         (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);
+         bt_cost_stepping(c, &(bt_cost_ice){.floes = n, .concentration = c->ice.concentration}) >
+             c->output.checkpoint_wall);
     bt_cost_disk d = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns +
                                 8 * IMPACT_ROWS * IMPACT_COLUMNS,
                       .checkpoints = on_the_way ? 2 * checkpoint : checkpoint,
@@ -160,7 +196,7 @@ double bt_cost_machine(void)
 
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err)
 {
-    const double need = bt_cost_memory(c, n_floes, comm->size, comm->ranks_here),
+    const double need = bt_cost_memory(c, n_floes, 0, comm->size, comm->ranks_here),
                  result = bt_cost_disk_of(c, n_floes, bt_cost_corners(c, NULL, n_floes), 2).result;
     if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
         bt_errors_add(err,

@@ -49,6 +49,17 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
         .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
         .doc = doc_                                                                                                    \
     }
+/// The default is a model basin's; `sea` is how to give the value in the geographic frame, which has none.
+#define BASIN(key, member, kind, preset_, range_, sea, doc_)                                                           \
+    {                                                                                                                  \
+        .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
+        .at_sea = sea, .doc = doc_                                                                                     \
+    }
+#define BASIN_CHOICE(key, member, names, preset_, sea, doc_)                                                           \
+    {                                                                                                                  \
+        .name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .at_sea = sea,            \
+        .doc = doc_                                                                                                    \
+    }
 #define INT(key, member, preset_, range_, doc_) \
     {.name = key, .type = BT_KEY_INT, .preset = preset_, .range = range_, AT(member), .doc = doc_}
 #define BOOL(key, member, preset_, doc_) {.name = key, .type = BT_KEY_BOOL, .preset = preset_, AT(member), .doc = doc_}
@@ -77,16 +88,18 @@ bt_key bt_case_keys[] = {
     CHOICE("domain.frame", domain.frame, frames, "basin",
            "basin: origin at the middle of the short side, x along, y across, on a map x east and y north; geographic: "
            "origin at the body, x north, y east [Yulmetov & Løset 2017]"),
-    REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]",
+    BASIN("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "as in 2 km",
          "extent along x; the default is HSVA's large ice tank, from memory"),
-    REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]",
+    BASIN("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "as in 1.2 km",
          "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
     REAL("domain.y0", domain.y0, LENGTH, "= -width/2", ANYWHERE, "low corner of the domain"),
-    CHOICE("domain.ends", domain.ends, end_bounds, "wall",
+    BASIN_CHOICE("domain.ends", domain.ends, end_bounds, "wall",
+                 "moving, periodic, open or wall",
            "boundaries at the ends of x; moving: the domain goes with the towed body, ice enters ahead and is dropped "
            "behind"),
-    CHOICE("domain.sides", domain.sides, bounds, "wall", "boundaries at the ends of y"),
+    BASIN_CHOICE("domain.sides", domain.sides, bounds, "wall",
+                 "periodic, open or wall", "boundaries at the ends of y"),
     REAL("domain.wall_friction", domain.wall_friction, RATIO, "0.1", "[0, 10]",
          "Coulomb coefficient between ice or body and walls, assumed"),
     REAL("domain.wall_restitution", domain.wall_restitution, RATIO, "0", "[0, 1]", "restitution at walls, assumed"),
@@ -99,9 +112,8 @@ bt_key bt_case_keys[] = {
          "distance from the body to the end ahead of it, which ends: moving keeps; without body.x it says where the "
          "body stands; the default is assumed"),
 
-    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]",
-         "area fraction of ice in the ice region less what the body and floes given by hand cover, 0 = open water; as "
-         "ice.size and ice.thickness, no default in the geographic frame"),
+    BASIN("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "as in 50 %, or 0 for open water",
+          "area fraction of ice in the ice region less what the body and floes given by hand cover, 0 = open water"),
     REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
     REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
@@ -110,9 +122,9 @@ bt_key bt_case_keys[] = {
            "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
     INT("ice.sides", ice.sides, "6", "[3, 32]", "corners of the floes of shape polygons"),
     REAL("ice.aspect", ice.aspect, RATIO, "1", "[1, 10]", "length / width of the floes of shape rectangles"),
-    REAL("ice.size", ice.size, LENGTH, "1 m", "(0, 1e5]",
-         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale; no default in the "
-         "geographic frame [Yulmetov & Løset 2017]"),
+    BASIN("ice.size", ice.size, LENGTH, "1 m", "(0, 1e5]", "as in 30 m",
+          "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale [Yulmetov & Løset 2017]; "
+          "where no ice is made, in the geographic frame by default the mean of `floes`, or the size of the body"),
     CHOICE("ice.size_law", ice.size_law, size_laws, "single", "distribution of the diameter"),
     REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]",
          "standard deviation / mean of the diameter, laws single and lognormal, assumed; above some 0.6 the floes that "
@@ -123,7 +135,8 @@ bt_key bt_case_keys[] = {
          "largest diameter, needed by law power; 0 = no limit"),
     REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
          "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
-    REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
+    BASIN("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "as in 1 m",
+          "mean floe thickness, assumed; none: every floe that is read or given by hand has its own"),
     CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant",
            "distribution of the thickness over the floes; lognormal: cut at the ends of its range"),
     REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]",
@@ -183,8 +196,8 @@ bt_key bt_case_keys[] = {
            "their hull (the area grows), or split into convex parts that move as one floe"),
 
     CHOICE("body.shape", body.shape, bt_body_shapes, "disc", "waterline of the towed body; none: no body"),
-    REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]",
-         "length of a named shape along its own x; no default in the geographic frame; assumed"),
+    BASIN("body.length", body.length, LENGTH, "2 m", "(0, 1e5]", "as in 80 m, or set body.shape: none",
+          "length of a named shape along its own x, assumed"),
     REAL("body.width", body.width, LENGTH, "= body.length", "(0, 1e5]", "width of a named shape"),
     {.name = "body.vertices",
      .type = BT_KEY_POINTS,
@@ -208,8 +221,8 @@ bt_key bt_case_keys[] = {
          "velocity at time zero, in every tow mode but speed; none: as body.vx"),
     REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]",
          "rate of turn at time zero, in every tow mode but speed"),
-    REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]",
-         "depth below the waterline; no default in the geographic frame; assumed"),
+    BASIN("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]", "as in 60 m, or set body.shape: none",
+          "depth below the waterline, assumed"),
     REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]",
          "height above the waterline"),
     REAL("body.density", body.density, DENSITY, "900 kg/m3", "[1, 2e4]",
@@ -233,9 +246,9 @@ bt_key bt_case_keys[] = {
     CHOICE("tow.mode", tow.mode, tow_modes, "speed",
            "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on "
            "a line; thrust: a vessel does, by its own power"),
-    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]",
-         "speed of the body (mode speed), of the end (mode line), or that the vessel keeps to if it can (mode thrust) "
-         "[Yulmetov & Løset 2017]; with a programme its largest"),
+    BASIN("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "as in 0.5 m/s, or set tow.mode: none",
+          "speed of the body (mode speed), of the end (mode line), or that the vessel keeps to if it can (mode thrust) "
+          "[Yulmetov & Løset 2017]; with a programme its largest"),
     REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]",
          "heading of the tow at the start, from the x axis towards y; with way-points that from the body to the first"),
     REAL("tow.ramp", tow.ramp, TIME,
@@ -267,11 +280,13 @@ bt_key bt_case_keys[] = {
             "where it starts; after the last it goes straight on"},
     REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]",
          "radius of the corners at way-points, 0 = sharp"),
-    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]",
-         "length of the unstretched line, modes line and thrust, assumed"),
-    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "= 10 kN, of a named line its own", "[0, 1e12]",
-         "EA: tension per unit of relative stretch, assumed unless the line is named"),
-    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]",
+    BASIN("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "as in 300 m",
+          "length of the unstretched line, modes line and thrust, assumed"),
+    BASIN("tow.line_stiffness", tow.line_stiffness, FORCE, "= 10 kN, of a named line its own", "[0, 1e12]",
+          "as in 100 MN, or name the line (tow.line.type, tow.line.diameter)",
+          "EA: tension per unit of relative stretch, assumed unless the line is named"),
+    REAL("tow.line_damping", tow.line_damping, DAMPING,
+         "= 100 N s/m (basin), 0.03 of the critical damping of the body on its line (geographic)", "[0, 1e12]",
          "tension per stretching speed, assumed"),
     REAL("tow.hull_x", tow.hull_x, LENGTH,
          "= foremost point of the waterline, of two branches the outermost on the +y side of the tow", "[-1e5, 1e5]",
@@ -387,7 +402,8 @@ bt_key bt_case_keys[] = {
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]",
         "limit of the work of the position projection: so many updates of every contact, residual passes counted too; "
         "assumed"),
-    REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]",
+    REAL("solver.rest_speed", solver.rest_speed, SPEED, "= 1e-3 m/s (basin), 0.01 x reference speed (geographic)",
+         "[0, 10]",
          "approach below this speed has no restitution, assumed"),
 
     REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]",

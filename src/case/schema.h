@@ -28,6 +28,8 @@ typedef struct bt_key {
     int least, most;     ///< number of points; 0 = 3 and BT_MAX_VERTICES, a polygon
     bt_unit unit_first;  ///< of the first of each pair where range_first says that it differs
     const char *range_first;
+    /// how to give the value at sea, where the default is a model basin's and the geographic frame has none; else NULL
+    const char *at_sea;
     bool file;           ///< a text that names a file, relative to the one in which it stands
     const char *doc;     ///< one sentence with its source
 } bt_key;

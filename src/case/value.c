@@ -32,12 +32,18 @@ bool bt_value_range(const bt_key *k, bt_range *r)
 }
 
 /// A ratio of 2 and more that would do as a percentage is taken for one; 1.2 is as well a slip of 0.12.
-static void suggest_percent(const bt_key *k, const bt_range *r, double value, const char *text, char meant[64])
+static void suggest_percent(const bt_key *k, const bt_range *r, double value, const char *text, char meant[80])
 {
+    const double tenths = value / 10;
+    const bool chart = !strcmp(k->name, "ice.concentration") && value >= 1 && value <= 10 && !strchr(text, '%');
+    if (chart && tenths <= r->hi)
+        snprintf(meant, 80, "did you mean %g (ice charts count tenths) or %g %%? ", tenths, value);
+    else if (chart) snprintf(meant, 80, "ice charts count tenths, and %g of them are %g; ", value, tenths);
+    if (chart) return;
     const double ratio = value / 100;
     if (k->unit != BT_UNIT_RATIO || strchr(text, '%')) return;
     if (value < 2 || value > 100 || ratio < r->lo || ratio > r->hi) return;
-    snprintf(meant, 64, "did you mean %g or %g %%? ", ratio, value);
+    snprintf(meant, 80, "did you mean %g or %g %%? ", ratio, value);
 }
 
 static bool in_range(const bt_key *k, double value, const char *text, char *why)
@@ -47,7 +53,7 @@ static bool in_range(const bt_key *k, double value, const char *text, char *why)
     if ((r.lo_open ? value > r.lo : value >= r.lo) && (r.hi_open ? value < r.hi : value <= r.hi)) return true;
     const char *bare = bt_units_bare(k->unit);
     bool plain = !strcmp(bare, "-");
-    char meant[64] = "";
+    char meant[80] = "";
     suggest_percent(k, &r, value, text, meant);
     snprintf(why, BT_WHY, "%.40s is out of range; %sgive a value in %s%s%s", text, meant, k->range, plain ? "" : " ",
              plain ? "" : bare);
@@ -168,7 +174,8 @@ bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, ch
         snprintf(why, BT_WHY, "has no value; give one or remove the key");
         return false;
     }
-    bool absent = plain && !strcmp(text, "none") && k->preset && (k->preset[0] == '=' || !strcmp(k->preset, "none"));
+    bool absent = plain && !strcmp(text, "none") && k->preset &&
+                  (k->preset[0] == '=' || k->at_sea || !strcmp(k->preset, "none"));
     switch (k->type) {
     case BT_KEY_REAL:
         if (!absent) return read_real(k, base, text, why);

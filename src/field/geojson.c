@@ -361,9 +361,13 @@ static void read_feature(reader *s, bt_features *features, size_t index, double 
                   name_of(feature, index, name), json_string_value(given));
         return;
     }
-    double thickness = bt_field_thickness(s->c, s->f->n);
+    double thickness;
     if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
-    else look_for_thickness(s, properties), counts->bare++;
+    else {
+        look_for_thickness(s, properties), counts->bare++;
+        if (isnan(s->c->ice.thickness)) return; // check_thickness
+        thickness = bt_field_thickness(s->c, s->f->n);
+    }
     const bt_idx i = s->f->n;
     bt_field_add(s->f, n, v, 0, 0, 0, thickness);
     counts->read++;
@@ -490,6 +494,17 @@ static void set_concentration(reader *s)
     bt_region_free(&y);
 }
 
+/// Floes without a thickness in a case that has none.
+static void check_thickness(reader *s, size_t features)
+{
+    const bt_outline_counts *o = &s->f->outlines;
+    if (!isnan(s->c->ice.thickness) || !o->bare) return;
+    bt_refuse(&s->r,
+              "%lld of %zu outlines have no property `thickness`%s%s%s, and the case has no ice.thickness, for which "
+              "domain.frame: geographic has no default; give it, as in 1 m",
+              (long long)o->bare, features, *o->nearly ? " (but " : "", o->nearly, *o->nearly ? ")" : "");
+}
+
 /// What the floes are together: far too small or large, they are in other units.
 static void check_whole(reader *s)
 {
@@ -529,6 +544,7 @@ static void read_features(reader *s, bt_features *features)
     double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
     for (size_t i = 0; i < features->n; i++) read_feature(s, features, i, v);
     free(v);
+    check_thickness(s, features->n);
     bt_outline_counts *o = &s->f->outlines;
     o->lon = s->kind == DEGREES ? s->lon0 : NAN;
     o->lat = s->kind == DEGREES ? s->lat0 : NAN;

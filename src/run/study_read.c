@@ -324,8 +324,8 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
     bt_node *root = bt_tree_parse(s->text, size, path, err);
     if (root && (root->kind != BT_NODE_MAP || !root->n))
         bt_errors_add(err, "%s: is not a study; it needs at least base: CASE.yml", path);
-    else if (root && bt_tree_has(root, "base") && !bt_case_is_study(root))
-        bt_errors_add(err, "%s: is a case, with a base, and no study; run it with `bergtow run`", path);
+    else if (bt_case_kind(root) == BT_FILE_CASE)
+        bt_errors_add(err, "%s: this is a case: bergtow run %s", path, path);
     else if (root) read_entries(&r, root);
     bt_tree_free(root);
     if (err->n == before) bt_study_check_axes(s, err);

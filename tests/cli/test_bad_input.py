@@ -78,7 +78,21 @@ TEXTS = {
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
     "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),
     "hexadecimal": (GOOD + "tow: {speed: 0x10}\n", 'bad.yml:5: tow.speed: "x10"'),
-    "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", 'bad.yml:5: tow.speed: ",13"'),
+    "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", "bad.yml:5: tow.speed: 0,13 has a comma; write decimals with a point, "
+                      "as in 0.13, and no sign between thousands"),
+    "decimal comma without braces": (GOOD + "tow:\n  speed: 0,13 m/s\n", "bad.yml:6: tow.speed: 0,13 m/s has a comma",
+                                     "as in 0.13 m/s,"),
+    "decimal comma in braces": (GOOD + "tow: {speed: 0,13 m/s, ramp: 1}\n", "bad.yml:5: tow.speed: 0,13 m/s has a comma",
+                                "as in 0.13 m/s"),
+    "decimal comma of a floe": (GOOD + "floes: [{x: 3, y: 1, length: 0,5}]\n",
+                                "bad.yml:5: floes[0].length: 0,5 has a comma", "as in 0.5"),
+    "comma between thousands": (GOOD + "tow:\n  ramp: 1,000 s\n", "bad.yml:6: tow.ramp: 1,000 s has a comma; write decimals "
+                                "with a point, and no sign between thousands"),
+    "concentration in tenths": (GOOD.replace("0.3", "8"), "bad.yml:3: ice.concentration: 8 is out of range",
+                                "did you mean 0.8 (ice charts count tenths) or 8 %?"),
+    "ten tenths": (GOOD.replace("0.3", "10"), "bad.yml:3: ice.concentration: 10 is out of range",
+                   "ice charts count tenths, and 10 of them are 1; give a value in [0, 0.95]"),
+    "concentration in percent": (GOOD.replace("0.3", "80"), "did you mean 0.8 or 80 %?"),
     "fraction for a whole number": (GOOD + "solver: {max_sweeps: 1.5}\n", "bad.yml:5: solver.max_sweeps",
                                     "whole number"),
     "integer overflow": (GOOD.replace("size: 1", "seed: 99999999999999999999"),
@@ -279,10 +293,31 @@ def test_open_water_needs_no_limits_of_a_law(folder):
 
 # ---- the command line ----
 
+def test_a_file_of_another_kind_is_told_its_command(folder):
+    """A case for a study, a study for a command or a result. Red with a list of unknown keys, or of no checkpoint."""
+    (folder / "study.yml").write_text("base: good.yml\nrepeats: 2\n")
+    done = call("ensemble", "good.yml", cwd=folder)
+    refused(done, CASE, "bergtow: good.yml: this is a case: bergtow run good.yml")
+    assert done.stderr.count(b"\n") == 1
+    refused(call("study.yml", cwd=folder), USAGE, "study.yml: this is a study: bergtow ensemble study.yml")
+    refused(call("resume", "study.yml", cwd=folder), USAGE, "study.yml: this is a study", "bergtow ensemble study.yml")
+    refused(call("run", "study.yml", cwd=folder), CASE, "study.yml: is a study", "bergtow ensemble")
+
+
+@pytest.mark.parametrize("name", ["budget", "capability", "converge", "design", "outlines"])
+def test_a_command_of_a_script_calls_itself_by_its_name(folder, name):
+    done = call(name, "--help", cwd=folder)
+    assert done.returncode == DONE and done.stdout.startswith(f"usage: bergtow {name} ".encode()), done.stdout
+    more = ["-o", "x.geojson"] if name == "outlines" else []
+    assert call(name, "none.yml", *more, cwd=folder).stderr.startswith(f"bergtow {name}: none.yml: ".encode())
+
+
 USAGES = {
     "no arguments": ([], "Usage: bergtow"),
     "unknown command": (["rum", "good.yml"], "rum: unknown command; did you mean run?"),
     "unlike any command": (["banana"], "banana: unknown command; see bergtow --help"),
+    "a case in place of a command": (["good.yml"], "bergtow: good.yml: this is a case: bergtow run good.yml"),
+    "a case in place of a result": (["resume", "good.yml"], "good.yml: this is a case: bergtow run good.yml"),
     "unknown option": (["--verison"], "--verison: unknown option; did you mean --version?"),
     "unknown option of a command": (["run", "good.yml", "--thread-count", "3"], "--thread-count: unknown option"),
     "mistyped option of a command": (["run", "good.yml", "--quite"], "--quite: unknown option; did you mean --quiet?"),

@@ -27,8 +27,13 @@ BALANCES = {
     "line, tide, dynamic tilt, wind, Coriolis, geographic": changed(
         TOW,
         domain__frame="geographic",
+        domain__ends="wall",
+        domain__sides="wall",
         domain__x0=0,
         tow__mode="line",
+        tow__line_length=5,
+        tow__line_stiffness=10e3,
+        tow__line_damping=100,
         tow__direction=10,
         air={"wind_x": 2, "wind_y": 4},
         water={
@@ -38,6 +43,8 @@ BALANCES = {
     "speed, tide, geostrophic, wind, Coriolis, geographic": changed(
         TOW,
         domain__frame="geographic",
+        domain__ends="wall",
+        domain__sides="wall",
         domain__x0=0,
         air={"wind_x": -2, "wind_y": 4},
         water={

@@ -163,7 +163,7 @@ def test_not_from_the_command_line(folder):
 
 def test_a_case_is_no_study(folder):
     done = call("ensemble", folder / "near.yml", "-o", folder / "out")
-    assert done.returncode == CASE and "near.yml: is a case, with a base, and no study" in done.stderr
+    assert done.returncode == CASE and ": this is a case: bergtow run " in done.stderr
 
 
 # ---- every command and script takes them ----

@@ -3,9 +3,13 @@
 `check` calls valid with a warning."""
 import json
 import os
+import random
 
+import numpy as np
 import pytest
+import yaml
 
+import random_cases
 from harness import CASE, DONE, IO, PRESS, TOW, call, changed, reading, run, texts, write_case
 
 GB = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
@@ -144,7 +148,43 @@ def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
     lines = call("check", write_case(tmp_path, changed(LOOSE, tow=line | {"ramp": 1}))).stdout.splitlines()
     assert lines[0].endswith("valid, with 1 warning") and lines[-1] == lines[0] and lines[-2].startswith(
         "warning              tow.ramp: 1 s is short for a body that swings on its line")
-    assert "warning" not in call("check", write_case(tmp_path, changed(LOOSE, tow=line | {"ramp": 100}))).stdout
+    slow = changed(LOOSE, tow=line | {"ramp": 100}, run__duration=120, domain__ends="open")
+    assert "warning" not in call("check", write_case(tmp_path, slow)).stdout
+
+
+def test_a_run_that_ends_within_its_ramp_is_a_warning(tmp_path):
+    said = "tow.ramp: the speed rises for 40 s and the run ends after 30 s"
+    case = changed(LOOSE, tow__ramp=40)
+    assert said in call("check", write_case(tmp_path, case)).stdout
+    assert any(w.startswith(said) for w in run(tmp_path, case, "--steps", 3).warnings)
+    assert "tow.ramp" not in call("check", write_case(tmp_path, changed(LOOSE, tow__ramp=29))).stdout
+
+
+def test_a_body_that_would_capsize_is_a_warning(tmp_path):
+    body = {"x": 3, "length": 2}
+    for shape, width in ({"shape": "disc"}, 2), ({"shape": "ship", "width": 0.5}, 0.5):
+        for draft, odd in (2.2 * width, True), (1.8 * width, False):
+            case = changed(LOOSE, body=body | shape | {"draft": draft})
+            said = call("check", write_case(tmp_path, case)).stdout
+            assert (f"body.draft: {draft:g} m is 2.2 times the least width of the body" in said) == odd, said
+
+
+def test_a_body_larger_than_an_open_domain_is_refused(tmp_path):
+    """Red when it is valid, with no floe beside the body."""
+    case = changed(MAP, domain__length=50, domain__width=50, ice__size=3, body__length=60)
+    said = call("check", write_case(tmp_path, case))
+    assert said.returncode == CASE and "the body spans 60.0482 m along x in a domain of 50 m" in said.stderr
+    assert "the body spans 60.0482 m along y" in said.stderr
+
+
+def test_thirty_lengths_of_a_disc_are_thirty_widths(tmp_path):
+    """Red when they are 29.98, by the polygon that has its area."""
+    case = changed(MAP, domain={"frame": "geographic", "length": 3000, "width": 2400, "ends": "open",
+                                "sides": "periodic"}, ice__concentration=0.75, body__x=-1000)
+    found = json.loads(call("check", write_case(tmp_path, case), "--json").stdout)["domain"]
+    assert found["body_widths"] == found["body_widths_needed"] == 30
+    assert "arches of rigid floes not expected" in call("check", tmp_path / "case.yml").stdout
+    assert "take at least 30 body widths" in call("check", tmp_path / "case.yml", "--set", "domain.width=2390").stdout
 
 
 def test_warnings_of_a_study(tmp_path):
@@ -162,8 +202,10 @@ def test_warnings_of_a_study(tmp_path):
 
 # ---- no sizes of a basin at full scale ----
 
-MAP = {"run": {"dt": 5, "duration": 600}, "domain": {"frame": "geographic", "length": 2000, "width": 1000},
-       "ice": {"concentration": 0.2, "size": 40, "thickness": 1}, "body": {"length": 80, "draft": 40}}
+MAP = {"run": {"dt": 5, "duration": 600},
+       "domain": {"frame": "geographic", "length": 2000, "width": 1000, "ends": "open", "sides": "open"},
+       "ice": {"concentration": 0.2, "size": 40, "thickness": 1}, "body": {"length": 80, "draft": 40},
+       "tow": {"mode": "line", "speed": 0.5, "line_length": 300, "line_stiffness": "100 MN"}}
 
 
 def missing(folder, case, *options):
@@ -173,15 +215,122 @@ def missing(folder, case, *options):
 
 def test_sizes_have_no_default_in_the_geographic_frame(tmp_path):
     assert missing(tmp_path, MAP) == (DONE, [])
-    keys = ["ice.concentration", "ice.size", "ice.thickness", "body.length", "body.draft"]
+    keys = ["domain.length", "domain.width", "domain.ends", "domain.sides", "ice.concentration", "ice.size",
+            "ice.thickness", "body.length", "body.draft", "tow.speed", "tow.line_length", "tow.line_stiffness"]
     for key in keys:
         case = changed(MAP, **{key.replace(".", "__"): None})
         assert missing(tmp_path, case) == (CASE, [key])
         text = call("check", tmp_path / "case.yml").stderr
         assert "missing, and in domain.frame: geographic it has no default" in text and "add it (" in text
         assert missing(tmp_path, case, "--set", f"{key}={MAP[key.split('.')[0]][key.split('.')[1]]}") == (DONE, [])
-    assert missing(tmp_path, changed(MAP, ice=None, body=None)) == (CASE, keys)
-    assert missing(tmp_path, changed(MAP, ice=None, body=None, domain__frame="basin")) == (DONE, [])
+    bare = changed(MAP, domain={"frame": "geographic"}, ice=None, body=None, tow={"mode": "line"})
+    assert missing(tmp_path, bare) == (CASE, keys)
+    assert missing(tmp_path, changed(bare, domain__frame="basin", run__dt=0.1, run__duration=10)) == (DONE, [])
+    listed = json.loads(call("--list-keys", "--json").stdout)["keys"]
+    assert [k["name"] for k in listed if not k["required"] and not k["default_at_sea"]] == keys
+
+
+def test_defaults_that_follow_from_the_scene_at_sea(tmp_path):
+    """Damping of the line and the speed of rest: in the basin they are numbers."""
+    tow = MAP["tow"]
+
+    def resolved(case, name):
+        text = (run(tmp_path, case, "--steps", 1, name=name).dir / "case.resolved.yml").read_text()
+        return yaml.safe_load(text)
+
+    def si(text):
+        return float(str(text).split()[0])
+
+    one = resolved(MAP, "one")
+    mass = 900 * np.pi / 4 * 80**2 * 40 * 1027 / 900 * 1.5
+    critical = 2 * np.sqrt(100e6 / 300 * mass)
+    assert si(one["tow"]["line_damping"]) == pytest.approx(0.03 * critical, rel=1e-3)
+    assert si(one["solver"]["rest_speed"]) == pytest.approx(0.005)
+    two = resolved(changed(MAP, tow=tow | {"line": {"branches": 2}}), "two")
+    assert si(two["tow"]["line_damping"]) == si(two["tow"]["branch2"]["damping"]) == pytest.approx(
+        0.5 * 0.03 * np.sqrt(2) * critical, rel=1e-3)
+    basin = changed(MAP, domain={"length": 2000, "width": 1000}, tow={"mode": "line"})
+    basin = resolved(basin, "basin")
+    assert si(basin["tow"]["line_damping"]) == 100 and si(basin["solver"]["rest_speed"]) == 1e-3
+    assert si(basin["tow"]["line_stiffness"]) == 10e3 and si(basin["tow"]["line_length"]) == 5
+
+
+def test_outlines_without_a_thickness(tmp_path):
+    """Red when they have the basin's 4 cm."""
+    ring = [[x, y] for x, y in ((0, 0), (30, 0), (30, 30), (0, 30), (0, 0))]
+
+    def outlines(*properties):
+        features = [{"type": "Feature", "properties": p, "geometry": {
+            "type": "Polygon", "coordinates": [[[x + 60 * k, y] for x, y in ring]]}} for k, p in enumerate(properties)]
+        (tmp_path / "floes.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+
+    case = changed(MAP, body={"shape": "none"}, tow={"mode": "none"},
+                   ice={"outlines": "floes.geojson", "outlines_crs": "plane"})
+    outlines({"thickness": 1}, {"thickness": 2})
+    assert missing(tmp_path, case) == (DONE, [])
+    assert "  thickness: none" in (run(tmp_path, case).dir / "case.resolved.yml").read_text()
+    again = run(tmp_path, tmp_path / "out/case.resolved.yml", name="again")
+    assert list(again.dataset("/floes/thickness")) == [1, 2]
+    outlines({"thickness": 1}, {"height": 2}, {"thick": 3})
+    for command in ("check", "run"):
+        said = call(command, write_case(tmp_path, case), *(["-o", tmp_path / "no"] if command == "run" else []))
+        assert said.returncode == CASE and "2 of 3 outlines have no property `thickness` (but `" in said.stderr
+    assert missing(tmp_path, case, "--set", "ice.thickness=1") == (DONE, [])
+    assert missing(tmp_path, changed(case, domain__frame="basin", domain__x0=-1000)) == (DONE, [])
+    text = "ice.thickness: is none where a value is needed"
+    assert text in call("check", write_case(tmp_path, changed(LOOSE, ice__thickness="none"))).stderr
+
+
+def test_no_case_runs_with_a_default_of_the_basin(tmp_path):
+    """300 valid cases at sea, from each of which keys are taken away at random: what is left is refused, or none of
+    the values that count is a basin's. Red when one of these rows has a default in both frames."""
+    table = json.loads(call("--list-keys", "--json").stdout)
+    basins = {k["name"]: k["default"] for k in table["keys"] if k["default_at_sea"] is False and not k["required"]}
+    drawn, seed, refused, valid = random.Random(7), 0, 0, 0
+    while valid + refused < 300:
+        seed += 1
+        case = random_cases.draw(seed, table)
+        if case["domain"]["frame"] != "geographic":
+            continue
+        whole = write_case(tmp_path, case, "whole.yml")
+        keys = [k for k in basins if random_cases.value_of(case, k) is not None]
+        for key in drawn.sample(keys, drawn.randint(0, min(3, len(keys)))):
+            *sections, last = key.split(".")
+            at = case
+            for section in sections:
+                at = at[section]
+            del at[last]
+        done = call("check", write_case(tmp_path, case), "--scale", 1)
+        if "it has no default (that would be a model basin's); add it" in done.stderr:
+            refused += done.returncode == CASE
+            continue
+        if call("check", whole).returncode == CASE:
+            continue
+        valid += 1
+        assert done.returncode == DONE, done.stderr
+        assert not in_use(case, yaml.safe_load(done.stdout), basins), random_cases.text(case)
+    assert refused > 50 and valid > 50
+
+
+def in_use(case, resolved, basins):
+    """Keys that nobody gave, that have the basin's value, and an effect."""
+    tow, body = resolved["tow"], resolved["body"]["shape"]
+    unused = set()
+    if tow["mode"] not in ("line", "thrust"):
+        unused |= {"tow.line_length", "tow.line_stiffness"}
+    if body == "none":
+        unused |= {"body.length", "body.draft", "tow.speed"}
+    if body == "polygon":
+        unused |= {"body.length"}
+    if tow["mode"] == "none" or tow["programme"] != "none":
+        unused |= {"tow.speed"}
+    if random_cases.value_of(case, "tow.line.type", "numbers") != "numbers": # the twin has its numbers
+        unused |= {"tow.line_stiffness"}
+    if resolved["ice"]["size_law"] == "power":
+        unused |= {"ice.size"}
+    if float(resolved["ice"]["concentration"]) == 0:
+        unused |= {"ice.thickness", "ice.size"}
+    return [k for k in basins if k not in unused and random_cases.value_of(case, k) is None]
 
 
 def test_what_needs_no_size_is_not_asked_for_one(tmp_path):

@@ -136,7 +136,8 @@ def test_a_range_of_angles_is_run_in_its_unit(tmp_path, sampling):
 
 def test_a_normal_range_of_angles_is_held_against_the_key_in_its_unit(tmp_path):
     """95 % from 60 to 89.9 degrees reaches beyond the pole."""
-    write_case(tmp_path, changed(TOW, domain__frame="geographic", body__x=2, body__y=0), "base.yml")
+    write_case(tmp_path, changed(TOW, domain__frame="geographic", domain__ends="wall", domain__sides="wall", body__x=2,
+                                 body__y=0), "base.yml")
     write_case(tmp_path, {"base": "base.yml", "sampling": "latin-hypercube", "samples": 4,
                           "parameters": {"water.latitude": {"from": "60 deg", "to": "89.9 deg",
                                                             "distribution": "normal"}}}, "study.yml")
@@ -295,7 +296,8 @@ def test_what_a_seed_or_a_frame_decided(tmp_path):
     done = call("check", write_case(tmp_path, wide))
     assert done.returncode == CASE and "ice.size_max: two floes of 290 m have no room" in done.stderr
     assert call("check", write_case(tmp_path, changed(wide, ice__size_max=140))).returncode == DONE
-    thin = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 200, "width": 200},
+    thin = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 200, "width": 200,
+                                                         "ends": "wall", "sides": "wall"},
             "ice": {"concentration": 0}, "body": {"shape": "none"},
             "floes": [{"length": 3, "x": 3, "y": 0, "thickness": "4 cm"}]}
     assert call("check", write_case(tmp_path, thin)).returncode == DONE
@@ -315,7 +317,8 @@ def test_a_window_of_the_basin_faces_its_way_points(tmp_path):
 
 
 def test_keys_of_the_tow_without_a_body(tmp_path):
-    case = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 400, "width": 300},
+    case = {"run": {"dt": 1, "duration": 20}, "domain": {"frame": "geographic", "length": 400, "width": 300,
+                                                         "ends": "wall", "sides": "wall"},
             "ice": {"concentration": 0.3, "size": 30, "thickness": 1}, "body": {"shape": "none"},
             "tow": {"mode": "none", "direction": 40}, "impact": {"panels": 12}, "output": {"panels": True}}
     said = call("check", write_case(tmp_path, case))

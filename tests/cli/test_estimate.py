@@ -14,7 +14,7 @@ KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchen
          "ships_in_pack_ice", "open_water_drag")
 BERG = {
     "run": {"dt": 5, "duration": 1000},
-    "domain": {"frame": "geographic", "length": 5000, "width": 2000},
+    "domain": {"frame": "geographic", "length": 5000, "width": 2000, "ends": "wall", "sides": "wall"},
     "ice": {"concentration": 0.8, "size": 30, "size_spread": 0, "thickness": 1.0, "restitution": 0.3},
     "body": {"shape": "rectangle", "length": 80, "width": 60, "draft": 50},
     "tow": {"speed": 0.5},

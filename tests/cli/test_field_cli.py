@@ -255,7 +255,8 @@ def test_a_field_for_another_body_is_refused(tmp_path):
 @pytest.mark.parametrize("spread, said", [(0.2, False), (1, True)])
 def test_sizes_that_are_not_those_of_the_law_are_said(tmp_path, spread, said):
     """At a wide spread small floes are drawn again or find no place; the mean diameter then is another."""
-    case = {"run": {"dt": 1, "duration": 2}, "domain": {"frame": "geographic", "length": 600, "width": 600},
+    case = {"run": {"dt": 1, "duration": 2}, "domain": {"frame": "geographic", "length": 600, "width": 600,
+                                                        "ends": "wall", "sides": "wall"},
             "ice": {"concentration": 0.5, "size": 20, "size_spread": spread, "thickness": 1},
             "body": {"length": 40, "draft": 20}, "tow": {"speed": 0.3}}
     done = call("field", write_case(tmp_path, case), "-o", tmp_path / "f.h5")

@@ -174,7 +174,8 @@ def test_heading(tmp_path, heading):
     got, *_ = field(tmp_path, case)
     for ring, drawn in zip(got, RINGS):
         assert same_ring(ring, np.c_[drawn @ along, drawn @ left], 1e-5)
-    assert "frame" in field(tmp_path, changed(case, domain__frame="geographic"), code=3)
+    assert "frame" in field(tmp_path, changed(case, domain__frame="geographic", domain__ends="wall",
+                                              domain__sides="wall"), code=3)
 
 
 def test_the_program_reads_it(tmp_path):
@@ -189,11 +190,13 @@ def test_the_program_reads_it(tmp_path):
     (tmp_path / "case.yml").write_text(f"run: {{dt: 1 s, duration: 3 s}}\n{domain.strip()}\n{ice.strip()}\n"
                                        f"{water.strip()}\n"
                                        "body: {shape: none}\n")
-    done = run(tmp_path, tmp_path / "case.yml")
+    asked = call("check", tmp_path / "case.yml")
+    assert asked.returncode == 3 and "5 of 5 outlines have no property `thickness`" in asked.stderr
+    done = run(tmp_path, tmp_path / "case.yml", "--set", "ice.thickness=1")
     assert done.warnings == [] and done.summary["outlines"]["read"] == 5 == reported["floes"]
     np.testing.assert_allclose(done.summary["concentration"], reported["concentration"], rtol=1e-6)
     np.testing.assert_allclose(done.summary["mean_size_m"], reported["mean_size_m"], rtol=1e-6)
-    got, *_ = field(tmp_path, yaml.safe_load((tmp_path / "case.yml").read_text()))
+    got, *_ = field(tmp_path, changed(yaml.safe_load((tmp_path / "case.yml").read_text()), ice__thickness=1))
     for ring, drawn in zip(got, RINGS[2::5], strict=True):  # the row in the middle, from west to east
         assert same_ring(ring, drawn[::-1, ::-1], 1e-3)
 
@@ -533,7 +536,8 @@ def test_a_crowd_of_overlapping_floes(tmp_path):
     assert written == pytest.approx(union.area - lost, rel=0.01)
     changes = sum(c["area_after_m2"] - c["area_before_m2"] for c in record["changes"].values())
     assert written == pytest.approx(sum(map(plane_area, rings)) + changes, rel=1e-9)
-    case = changed(FRAMES["geographic"], domain={"frame": "geographic", "length": 480, "width": 480},
+    case = changed(FRAMES["geographic"], domain={"frame": "geographic", "length": 480, "width": 480, "ends": "wall",
+                                                 "sides": "wall"},
                    ice={"outlines": "floes.geojson", "nonconvex": "split", "thickness": 1})
     done = run(tmp_path, case)
     assert done.summary["outlines"]["read"] == len(got) and done.warnings == []

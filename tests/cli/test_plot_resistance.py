@@ -14,7 +14,8 @@ import style  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
 BERG = {
-    "run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
+    "run": {"dt": 5, "duration": 1000},
+    "domain": {"frame": "geographic", "length": 5000, "width": 2000, "ends": "wall", "sides": "wall"},
     "ice": {"concentration": 0.8, "size": 30, "size_spread": 0,
             "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}
 }

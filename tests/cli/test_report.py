@@ -48,7 +48,7 @@ MOVING = changed(
     body={"length": 2, "draft": 0.5},
     run__duration=60,
     tow={
-        "mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000,
+        "mode": "line", "speed": 0.2, "ramp": 2, "line_length": 5, "line_stiffness": 50e3, "line_damping": 1000,
         "line": {"breaking_load": 1e6}
     })
 

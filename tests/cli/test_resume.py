@@ -277,7 +277,8 @@ def test_a_resume_that_cannot_begin_leaves_the_folder(stopped):
 
 def test_without_a_body_in_a_domain_far_from_the_origin(tmp_path):
     """Red when the file of all keys gives a distance ahead of a body that is not there, which no case may have."""
-    case = {"run": {"dt": 0.2, "duration": 4}, "domain": {"frame": "geographic", "x0": -17, "length": 5, "width": 4},
+    case = {"run": {"dt": 0.2, "duration": 4}, "domain": {"frame": "geographic", "x0": -17, "length": 5, "width": 4,
+                                                          "ends": "wall", "sides": "wall"},
             "body": {"shape": "none"}, "tow": {"mode": "none"},
             "ice": {"concentration": 0.4, "size": 0.8, "thickness": 0.1}}
     whole = run(tmp_path, case, "--quiet", name="whole")

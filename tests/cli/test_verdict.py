@@ -19,7 +19,7 @@ BERG = {
     },
     "body": {"shape": "disc", "length": 80, "draft": 60, "x": -500, "y": 0},
     "tow": {
-        "mode": "line", "speed": 0.5, "direction": 0, "line_length": 400,
+        "mode": "line", "speed": 0.5, "direction": 0, "line_length": 400, "line_damping": 100,
         "line": {"type": "dyneema", "diameter": "150 mm", "breaking_load": 0}
     },
     "output": {"frame_interval": 1500},

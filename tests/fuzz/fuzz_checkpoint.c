@@ -32,8 +32,8 @@ static const struct { const char *text; int64_t steps;
      14},
     {"run: {dt: 0.125, duration: 5}\ndomain: {frame: geographic, length: 20, width: 8, ends: moving, sides: periodic, "
      "ahead: 10}\nice: {concentration: 0.3, size: 1.5, thickness: 0.04}\n"
-     "body: {length: 2, draft: 0.5}\ntow: {mode: thrust, speed: 1.5, ramp: 0.5, line_length: 3, vessel: {mass: 800, "
-     "bollard_pull: 600, free_speed: 3}}\n"
+     "body: {length: 2, draft: 0.5}\ntow: {mode: thrust, speed: 1.5, ramp: 0.5, line_length: 3, line_stiffness: 10 kN, "
+     "line_damping: 100, vessel: {mass: 800, bollard_pull: 600, free_speed: 3}}\n"
      "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\nair: {wind_x: 5}\nsolver: {tile: 2, "
      "max_sweeps: 20}\n",
      24},

@@ -18,8 +18,8 @@ static const char *const bases[] = {
     ("run: {dt: 1, duration: 20}\ndomain: {frame: geographic, length: 300, width: 200, ends: open, sides: periodic}\n"
      "ice: {concentration: 0.4, size: 40, shape: rectangles, thickness: 1}\nbody: {shape: ship, length: 40, width: 15, "
      "draft: 0.5}\n"
-     "tow: {mode: thrust, speed: 1, line_length: 40, vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: "
-     "7}}\nwater: {latitude: 75}\n"),
+     "tow: {mode: thrust, speed: 1, line_length: 40, line_stiffness: 1 MN, vessel: {mass: 500 t, bollard_pull: "
+     "900 kN, free_speed: 7}}\nwater: {latitude: 75}\n"),
     ("run: {dt: 0.5, duration: 20}\ndomain: {length: 40, width: 10, ends: moving}\nice: {concentration: 0.3, size: 3, "
      "size_law: power, size_min: 2, size_max: 5}\n"
      "body: {length: 2}\ntow: {mode: line, speed: 0.3}\nlead: {mode: managed, floe_size: 1}\n"),

@@ -16,7 +16,8 @@ FOUR = 1 << 32
 TILE, SIDE = 3600, 6 * 3600
 LOOSE = {
     "run": {"dt": 1, "duration": 300},
-    "domain": {"frame": "geographic", "x0": 0, "y0": 0, "length": SIDE, "width": SIDE, "sides": "periodic"},
+    "domain": {"frame": "geographic", "x0": 0, "y0": 0, "length": SIDE, "width": SIDE, "ends": "wall",
+               "sides": "periodic"},
     "ice": {"concentration": 0.5, "size": 30, "thickness": 1, "start": "rest"},
     "body": {"shape": "none"},
     "tow": {"mode": "none"},

@@ -22,7 +22,7 @@ CASE = {
     "ice": {"concentration": 0.6, "size": 31, "thickness": 0.5, "thickness_law": "lognormal"},
     "body": {"length": 80, "draft": 30},
     "tow": {
-        "mode": "line", "speed": 0.8, "ramp": 600, "line_length": 200,
+        "mode": "line", "speed": 0.8, "ramp": 600, "line_length": 200, "line_damping": 100,
         "line": {"type": "dyneema", "diameter": "150 mm"}
     },
     "output": {

@@ -23,7 +23,7 @@ ALL = {
     "tow": {
         "mode": "thrust", "programme": [[0, 0], [2, 0.8], [30, 0.8],
                                         [36, 0.5]], "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3,
-        "line_length": 3, "line_stiffness": 2000, "line": {"branches": 2,
+        "line_length": 3, "line_stiffness": 2000, "line_damping": 100, "line": {"branches": 2,
                                                            "breaking_load": 0}, "branch2": {"breaking_load": 150},
         "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
     },
@@ -33,7 +33,7 @@ ALL = {
     },
     "air": {"wind_x": -3, "wind_y": 3},
     "impact": {"conversion": "crushing", "pressure": "20 kPa"},
-    "solver": {"tile": 2.5, "max_sweeps": 40},
+    "solver": {"tile": 2.5, "max_sweeps": 40, "rest_speed": 1e-3},
     "output": {"frame_interval": 6, "panels": True},
 }
 

@@ -87,8 +87,9 @@ static void a_geographic_domain_lies_about_the_origin(void **state)
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c,
-                  "run: {dt: 1, duration: 10}\ndomain: {frame: geographic, length: 2 km, width: 1 km}\nice: "
-                  "{concentration: 0.8, size: 30 m, thickness: 1}\nbody: {length: 2, draft: 0.5}\n",
+                  "run: {dt: 1, duration: 10}\ndomain: {frame: geographic, length: 2 km, width: 1 km, ends: open, "
+                  "sides: open}\nice: {concentration: 0.8, size: 30 m, thickness: 1}\nbody: {length: 2, draft: 0.5}\n"
+                  "tow: {speed: 0.1}\n",
                   &err))
         fail_with(&err, "refused");
     assert_true(c.domain.x0 == -1000 && c.domain.y0 == -500 && c.body.x == 0);

@@ -147,8 +147,14 @@ static void resolved_text_of_the_resolved_text_is_identical(void **state)
         "run: {dt: 0.3, duration: 100}\nbody: {shape: none}\n",
         "run: {dt: 0.1, duration: 100}\ntow: {mode: none}\nbody: {shape: ship, length: 4.1, width: 1.3, yaw: 33, vx: "
         "0.1}\n",
-        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 nmi, width: 0.7 km, sides: open}\nice: "
-        "{concentration: 0.8, size: 33.3, thickness: 0.04}\nbody: {length: 2, draft: 0.5}\n",
+        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 nmi, width: 0.7 km, ends: wall, sides: "
+        "open}\nice: "
+        "{concentration: 0.8, size: 33.3, thickness: 0.04}\nbody: {length: 2, draft: 0.5}\ntow: {speed: 0.13}\n",
+        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 km, width: 1 km, ends: open, sides: open}\n"
+        "ice: {outlines: some.json}\nbody: {length: 2, draft: 0.5}\n"
+        "tow: {mode: line, speed: 0.13, line_length: 9, line_stiffness: 9 kN}\n",
+        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 km, width: 1 km, ends: open, sides: open}\n"
+        "ice: {concentration: 0}\nfloes: [{x: 9.1, y: 0.3, length: 0.7, thickness: 1}]\nbody: {shape: none}\n",
         "run: {dt: 0.1, duration: 100}\nfloes: [{x: 9.1, y: 0.3, length: 0.7}, {x: 20, y: 0, shape: polygon, vertices: "
         "[[0,0],[1,0],[0,1]]}]\n",
     };

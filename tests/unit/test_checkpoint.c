@@ -97,7 +97,7 @@ static const struct scenario {
      "body: {length: 2, draft: 0.5, x: -14}\n"
      "tow: {mode: thrust, programme: [[0, 0], [2, 0.9], [20, 0.9], [28, 0.3]], waypoints: [[-9, 0], [0, 4], [60, 4]], "
      "turn_radius: 2, line_length: 3,\n"
-     "      line_stiffness: 2000, line: {branches: 2}, branch2: {breaking_load: 90},\n"
+     "      line_stiffness: 2000, line_damping: 100, line: {branches: 2}, branch2: {breaking_load: 90},\n"
      "      vessel: {mass: 800, bollard_pull: 600, free_speed: 3, lookahead: 3}}\n"
      "water: {latitude: 75, tilt: dynamic, tide: {major: 0.05, minor: 0.02, period: 60}}\n"
      "air: {wind_table: wind.csv}\n"
@@ -108,7 +108,8 @@ static const struct scenario {
      "domain: {frame: geographic, length: 26, width: 14, ends: moving, sides: wall, ahead: 14}\n"
      "ice: {concentration: 0.35, size: 1, size_law: lognormal, thickness: 0.04, thickness_law: lognormal}\n"
      "body: {length: 2, draft: 0.5}\n"
-     "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3, direction: 180}\n"
+     "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3, line_stiffness: 10 kN, line_damping: 100, direction: "
+     "180}\n"
      "water: {latitude: 75, current_x: 0.1}\n"
      "air: {wind_x: 5, wind_y: 3}\n"
      "solver: {tile: 2.5, max_sweeps: 40}\n",

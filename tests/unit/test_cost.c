@@ -19,17 +19,41 @@ static bt_case a_case(void)
     return c;
 }
 
-// By hand: 20 MB + n (2048/ranks + 200) on each rank of the node, and on one n 300 for a checkpoint and 192 B of each
-// of a million steps; with collisions 32 B for each of 36 panels and 3125 blocks of 320 steps.
+// By hand: 30 MB + n (2048/ranks + 200) and 450 B a part on each rank of the node, and on one n 300 for a checkpoint, a
+// quarter more than 192 B of each of a million steps, 810 B an entry, here of 100,000, up to 110 MB, and 0.14 MB a
+// frame, here of 501, up to 60 MB; with collisions 32 B for each of 36 panels and 3125 blocks of 320 steps.
 static void memory_by_hand(void **state)
 {
     (void)state;
     bt_case c = a_case();
-    assert_float_equal(bt_cost_memory(&c, 1e6, 1, 1), 20e6 + 2548e6 + 192e6, 1);
-    assert_float_equal(bt_cost_memory(&c, 1e6, 4, 2), 2 * (20e6 + 712e6) + 300e6 + 192e6, 1);
+    const double kept = 240e6 + 81e6 + 60e6;
+    assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept, 1);
+    assert_float_equal(bt_cost_memory(&c, 1e6, 8e6, 4, 2), 2 * (30e6 + 712e6 + 900e6) + 300e6 + kept, 1);
+    c.output.sample_every = 1;
+    assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept + 29e6, 1);
+    c.output.sample_every = 10;
     c.body.shape = BT_BODY_DISC;
     c.impact.conversion = BT_IMPACT_DURATION;
-    assert_float_equal(bt_cost_memory(&c, 1e6, 1, 1), 20e6 + 2548e6 + 192e6 + 32 * 36 * 3125, 1);
+    assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept + 1.25 * 32 * 36 * 3125, 1);
+}
+
+// By hand: 30 ms, a million steps of 8 µs, 100,000 entries of 17 µs, 501 frames of 1 ms and 0.3 µs a floe; 1000 floes of 0.8
+// µs at 50 %, and of 100 floes in 10 parts each 0.05 µs a part and 6 ns for half the pairs of them.
+static void time_by_hand(void **state)
+{
+    (void)state;
+    bt_case c = a_case();
+    bt_cost_ice ice = {.floes = 1000, .concentration = 0.5};
+    const double rest = 0.03 + 8 + 1.7 + 501 * 1.3e-3;
+    assert_float_equal(bt_cost_stepping(&c, &ice), rest + 800, 1e-6);
+    ice.split = 100, ice.parts = 1000;
+    assert_float_equal(bt_cost_stepping(&c, &ice), rest + 800 + 50 + 30, 1e-6);
+    c.ice.concentration = 0.5, c.ice.shake = 15;
+    assert_float_equal(bt_cost_making(&c, 1000), 0.39, 1e-9);
+    c.ice.concentration = 0.95, c.ice.shape = BT_ICE_RECTANGLES;
+    assert_float_equal(bt_cost_making(&c, 1000), 0.75 * 0.21, 1e-9);
+    c.ice.field = (char *)"read.h5";
+    assert_float_equal(bt_cost_making(&c, 1000), 0, 0);
 }
 
 // By hand, from several ranks (nothing is compressed): 501 frames of 1000 floes of 6 corners at 56 B, 48 B of corners
@@ -72,11 +96,11 @@ static void what_does_not_fit_is_refused_with_both_numbers(void **state)
     (void)state;
     const bt_case c = a_case();
     bt_errors err = {0};
-    assert_int_equal(bt_cost_fits(&c, 1e6, &bt_comm_alone, 2.761e9, &err), BT_OK);
+    assert_int_equal(bt_cost_fits(&c, 1e6, &bt_comm_alone, 2.960e9, &err), BT_OK);
     assert_int_equal(err.n, 0);
-    assert_int_equal(bt_cost_fits(&c, 1e6, &bt_comm_alone, 2.759e9, &err), BT_ERR_CASE);
+    assert_int_equal(bt_cost_fits(&c, 1e6, &bt_comm_alone, 2.958e9, &err), BT_ERR_CASE);
     assert_int_equal(err.n, 1);
-    assert_non_null(strstr(err.text[0], "need some 2.76 GB of memory"));
+    assert_non_null(strstr(err.text[0], "need some 2.96 GB of memory"));
     assert_non_null(strstr(err.text[0], "ice.size"));
     bt_errors_free(&err);
     assert_int_equal(bt_cost_fits(&c, 4.5e8, &bt_comm_alone, 1e15, &err), BT_ERR_CASE);
@@ -89,6 +113,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(memory_by_hand),
+        cmocka_unit_test(time_by_hand),
         cmocka_unit_test(disk_by_hand),
         cmocka_unit_test(a_step_has_one_frame_at_most),
         cmocka_unit_test(what_does_not_fit_is_refused_with_both_numbers),

@@ -262,7 +262,8 @@ static void model_and_full_scale_agree(void **state)
         bt_case c;
         char text[400];
         snprintf(text, sizeof text,
-                 "run: {dt: 5, duration: 1000}\ndomain: {length: 5 km, width: 2 km, frame: geographic}\n"
+                 "run: {dt: 5, duration: 1000}\ndomain: {length: 5 km, width: 2 km, frame: geographic, ends: "
+                 "wall, sides: wall}\n"
                  "ice: {size: 30 m, thickness: %s m, concentration: 0.95}\nbody: {length: 80 m, draft: 60 m}\n"
                  "tow: {speed: 0.5}\nwater: {current_x: -0.1}\n",
                  k ? "2" : "1"); // captured, or not

@@ -60,7 +60,7 @@ static const char *const cases[] = {
     "domain: {frame: geographic, length: 26, width: 10, ends: moving, sides: periodic, ahead: 14}\n"
     "ice: {concentration: 0.35, size: 1, thickness: 0.04}\n"
     "body: {length: 2, draft: 0.5}\n"
-    "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3}\n"
+    "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3, line_stiffness: 10 kN, line_damping: 100}\n"
     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\n"
     "solver: {tile: 2.5, max_sweeps: 40}\n",
 };
