@@ -7,8 +7,9 @@
     time, ice = e.series(m)                        # of member m, all of its run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
-ensemble.h5 holds all but collisions; those are in the members' folders. It is read only under a sound seal, and a member whose files do not fit the record of its end (soundness.py) counts as waiting: it is in no
-number until `bergtow ensemble` has run it again. Errors: RunError.
+ensemble.h5 holds all but collisions and most series; those are in the members' folders. It is read only
+under a sound seal, and a member whose files do not fit the record of its end (soundness.py) counts as waiting: it is in
+no number until `bergtow ensemble` has run it again. Errors: RunError.
 """
 import json
 from collections import defaultdict
@@ -111,8 +112,8 @@ def listed(names, most=8):
 
 
 class Ensemble:
-    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason, hole:
-    [M]; unsound: {name: why}."""
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason,
+    hole: [M]; unsound: {name: why}."""
 
     def __init__(self, path):
         self.path = Path(path)
@@ -304,8 +305,8 @@ class Ensemble:
             few = self.number("window_n_contact_stretches", m) < MIN_STRETCHES
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
-                "unsteady": verdict == NOT_STEADY, "short": short and not few, "few": few, "stopped": "stopped" in codes,
-                "other": bool(codes - TOLD)
+                "unsteady": verdict == NOT_STEADY, "short": short and not few, "few": few,
+                "stopped": "stopped" in codes, "other": bool(codes - TOLD)
             }
             out[int(m)] = {kind for kind, there in checks.items() if there}
         return out

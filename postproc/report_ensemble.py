@@ -7,7 +7,6 @@ same.
 """
 import argparse
 import os
-import re
 import sys
 from dataclasses import replace
 from itertools import groupby

@@ -255,13 +255,14 @@ def run_scene(folder, name, layout, binary=BERGTOW):
 
 
 def leaves(path, value):
-    """(path, text) of all that a value of the summary holds: each key by itself, in a list of maps, too."""
+    """(path, text) of all that a value of the summary holds: each key by itself, in a list of maps, too. Texts of
+    warnings may change: their codes and values stand for them."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from leaves(f"{path}.{key}", inner)
     elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
         yield path, f"{len(value)} entries"
-        for key in dict.fromkeys(k for v in value for k in v):
+        for key in dict.fromkeys(k for v in value for k in v if k != "text"):
             yield f"{path}[].{key}", json.dumps([v.get(key) for v in value])
     else:
         yield path, json.dumps(value) if value != [] else "0 entries"

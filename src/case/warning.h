@@ -2,9 +2,9 @@
 // Warnings of a case and a run, and reasons of a verdict: a code, a text for readers, and the values in it.
 //
 // Scripts and postproc/ read codes and values, which stay. Texts may change at any time; they stand where the fact is
-// known, beside what they are made of. One row a code: its name, the names of the values in the order of the conversions
-// of its text, and its meaning, which is the same whatever the values are. A value is a number, or the name of a key, a
-// series or a choice; "-" stands for what is wording alone, as is all behind the last name.
+// known, beside what they are made of. One row a code: its name, the names of the values in the order of the
+// conversions of its text, and its meaning, which is the same whatever the values are. A value is a number, or the name
+// of a key, a series or a choice; "-" stands for what is wording alone, as is all behind the last name.
 #ifndef BT_WARNING_H
 #define BT_WARNING_H
 

@@ -289,7 +289,8 @@ def another(path):
     ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json changed since"),
     ("summary.json", cut, "summary.json changed since"), ("summary.json", another, "summary.json changed since"),
     ("summary.json", Path.unlink, "summary.json is missing"), ("result.h5", another, "result.h5 changed since"),
-    ("finished", another, "is of another run"), ("finished", cut, "changed since"), ("finished", Path.unlink, "missing")])
+    ("finished", another, "is of another run"), ("finished", cut, "changed since"),
+    ("finished", Path.unlink, "missing")])
 def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
     """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
     first = runs_of(tmp_path, CASE)
@@ -369,7 +370,8 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
 def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
     made = case_runs.CaseRuns.begin
     monkeypatch.setattr(case_runs.CaseRuns, "begin", lambda runs, name, i, values: made(runs, name, i, values) if
-                        name == "case" else (5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n", False))
+                        name == "case" else (
+                            5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n", False))
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     short = changed(CASE, run__duration=5, output__window_start=2)
     path = write_case(tmp_path, short)

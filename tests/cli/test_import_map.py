@@ -5,7 +5,6 @@ Places are known by geodesics (pyproj.Geod), which the command does not use; map
 by GDAL's own ogr2ogr; what comes out is read by the program's C reader, which has a projection of its own.
 """
 import json
-import re
 import subprocess
 import sys
 

@@ -113,7 +113,8 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
                "mean_ice_resistance_se_n": 0.5, "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
                "window": {"start_s": 3.0, "end_s": 10.0, "verdict": "steady", "reasons": []},
                "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None,
-               "warnings": [{"code": "overlap", "text": f"{n} doubt", "values": {}} for n in ("first", "second", "third")]}
+               "warnings": [{"code": "overlap", "text": f"{n} doubt", "values": {}}
+                            for n in ("first", "second", "third")]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return folder
 
