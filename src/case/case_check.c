@@ -98,7 +98,7 @@ static void follow(const check *k)
         bt_check_fill(&f->thickness, c->ice.thickness);
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
-    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
+    bt_case_fill_size(c);
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
 }
