@@ -41,8 +41,8 @@ double bt_cost_seconds(const bt_case *c);
 
 /// Memory of a node with ranks_here of `size` ranks, B: 30 MB of the program and its libraries, 2 kB a floe (body
 /// arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice) and 0.45 kB a part of floes that are not convex,
-/// shared by the ranks, 0.2 kB a floe on each for the field at time zero; on one of them 0.3 kB a floe for the time of a
-/// checkpoint, what the summary keeps of every step, and what HDF5 keeps of each entry and frame.
+/// shared by the ranks, 0.2 kB a floe on each for the field at time zero; on one of them 0.3 kB a floe for the time of
+/// a checkpoint, what the summary keeps of every step, and what HDF5 keeps of each entry and frame.
 double bt_cost_memory(const bt_case *c, double n_floes, double parts, int size, int ranks_here);
 
 /// Corners of all floes: of the field where one was read (f->n > 0, or f NULL), else as many as n floes of the shape
