@@ -72,6 +72,7 @@ void bt_check_print_json(const char *path, const bt_case *c, const bt_comm *comm
     write_domain(&j, c, n);
     write_ice(&j, n);
     write_run(&j, c, run);
+    bt_check_write_defaults(&j, c);
     write_cost(&j, c, comm, run);
     bt_json_close(&j, '}');
     fputs(j.text, stdout);

@@ -98,8 +98,8 @@ static void print_line(const bt_case *c)
 {
     const bool thrust = c->tow.mode == BT_TOW_THRUST;
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-    printf("line                 %s, %d x %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", rope.name,
-           (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
+    printf("line                 %s, %d x %.4g m, EA %.4g N, damping %.4g N s/m, breaking load %s%.4g N%s\n",
+           rope.name, (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness, c->tow.line_damping,
            c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load,
            c->tow.line.breaking_load > 0 ? "" : " = never breaks");
     if (c->tow.line.branches > 1)
@@ -270,7 +270,8 @@ static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice
     const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size),
                        several = bt_cost_disk_of(c, n->count, n->corners, 2);
     char a[32], b[32], e[32];
-    printf("memory               about %s\n", bytes(bt_cost_memory(c, n->count, n->parts, comm->size, comm->ranks_here), a));
+    const double memory = bt_cost_memory(c, n->count, n->parts, comm->size, comm->ranks_here);
+    printf("memory               about %s\n", bytes(memory, a));
     printf("frames               %.0f\n", bt_cost_frames(c));
     printf("disk                 about %s, up to %s while it runs", bytes(bt_cost_left(&d), a), bytes(d.most, b));
     if (comm->size == 1) printf("; %s from several ranks, which do not compress", bytes(bt_cost_left(&several), e));
@@ -332,6 +333,7 @@ static void print_text(const char *path, const bt_case *c, const bt_field *f, co
     print_environment(c);
     print_drift(c, run);
     print_lead(c, lead);
+    bt_check_print_defaults(c);
     print_step(c, n);
     print_cost(c, comm, run);
     print_warnings(path, warnings);

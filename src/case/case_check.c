@@ -99,7 +99,7 @@ static void follow(const check *k)
         bt_check_fill(&f->thickness, c->ice.thickness);
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
-    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
+    bt_case_fill_size(c);
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_files(k);
 }
@@ -579,10 +579,10 @@ void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
                       c->body.mass > 0 ? "body.mass" : "body.density", ratio);
     const double least = least_width(n, v);
     if (c->body.draft > BT_ODD_DRAFT * least)
-        bt_errors_add(warnings,
-                      "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check "
-                      "both, and their units",
-                      c->body.draft, c->body.draft / least, least);
+        bt_warn(warnings, BT_WARN_ODD_DRAFT,
+                "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check both, "
+                "and their units",
+                c->body.draft, c->body.draft / least, least);
     if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
         bt_warn(warnings, BT_WARN_LONG_IMPACT,
                       "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "

@@ -22,6 +22,9 @@ static inline void bt_check_fill(double *member, double value)
 
 /// The defaults of numbers that follow from other keys, of a case whose shapes are sound.
 void bt_case_fill(bt_case *c);
+/// Mean floe size of a case in the geographic frame that makes and reads no ice: that of its floes, which have
+/// outlines, or the size of the body.
+void bt_case_fill_size(bt_case *c);
 /// Those of domain, ice and body alone.
 void bt_case_fill_scene(bt_case *c);
 /// Those of collisions, once the tow has its own.

@@ -1,10 +1,23 @@
 // SPDX-License-Identifier: MIT
 // Numbers that follow from other keys where they are not given.
 #include "case/case_check.h"
-#include "case/case_frame.h"
 
 #include "bergtow/shape.h"
 #include "base/largest.h"
+
+static const double REST_SPEED = 0.01; // of the reference speed, assumed; in the basin 1e-3 m/s of 0.13 m/s
+
+static double size_of(int n, const double *v) { return n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0; }
+
+void bt_case_fill_size(bt_case *c)
+{
+    if (!isnan(c->ice.size) || c->domain.frame == BT_FRAME_BASIN) return;
+    if (bt_case_makes_ice(c) || bt_case_reads_field(c)) return; // that is asked for
+    double v[2 * BT_MAX_VERTICES], sum = 0;
+    for (bt_idx i = 0; i < c->n_floes; i++) sum += size_of(bt_case_floe_outline(&c->floes[i], v), v);
+    const double body = size_of(bt_case_waterline(c, v), v);
+    c->ice.size = sum > 0 ? sum / c->n_floes : body > 0 ? body : 1; // of no bodies: without effect
+}
 
 void bt_case_fill_scene(bt_case *c)
 {
@@ -28,7 +41,8 @@ void bt_case_fill_impact(bt_case *c)
 {
     bt_check_fill(&c->impact.duration, c->run.dt);
     bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
-    bt_check_fill(&c->solver.rest_speed, bt_case_frame_rest_speed(c));
+    const bool basin = c->domain.frame == BT_FRAME_BASIN;
+    bt_check_fill(&c->solver.rest_speed, basin ? 1e-3 : REST_SPEED * bt_case_reference_speed(c));
 }
 
 void bt_case_fill(bt_case *c)
@@ -36,7 +50,7 @@ void bt_case_fill(bt_case *c)
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
     bt_case_fill_scene(c);
-    bt_check_fill(&c->ice.size, bt_case_frame_size(c));
+    bt_case_fill_size(c);
     bt_case_tow_follow(&(bt_check){.c = c});
     bt_case_tow_hull(c, n, v);
     bt_case_tow_ramp(c);

@@ -4,50 +4,19 @@
 // A row of the table of keys says with at_sea that its default is a model basin's. In the geographic frame such a
 // number would look like an answer: there it is none until the case gives it, or another key does (a programme the
 // speed, a named line its stiffness). Where it is then still none and has an effect, the case is refused. Other
-// defaults hold in both frames, or follow from the scene in the geographic one.
+// defaults hold in both frames, or follow from the scene in the geographic one (case_fill.c, case_tow.c).
 #include "case/case_frame.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "bergtow/shape.h"
-#include "case/case_check.h"
 #include "case/case_derived.h"
 #include "case/case_idle.h"
 #include "case/schema.h"
 
-static const double LINE_DAMPING = 0.03; // of critical, assumed
-static const double REST_SPEED = 0.01;   // of the reference speed, assumed; in the basin 1e-3 m/s of 0.13 m/s
-
 static double *number(bt_case *c, const bt_key *k) { return (double *)(void *)((char *)c + k->offset); }
 
 static bool is_basin(const bt_case *c) { return c->domain.frame == BT_FRAME_BASIN; }
-
-double bt_case_frame_size(const bt_case *c)
-{
-    if (is_basin(c) || bt_case_makes_ice(c) || bt_case_reads_field(c)) return NAN; // that is asked for
-    double v[2 * BT_MAX_VERTICES], sum = 0;
-    for (bt_idx i = 0; i < c->n_floes; i++) {
-        const int n = bt_case_floe_outline(&c->floes[i], v);
-        if (n) sum += sqrt(4 / BT_PI * bt_shape_moments(n, v).area);
-    }
-    if (sum > 0) return sum / c->n_floes;
-    const int n = bt_case_waterline(c, v);
-    return n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 1; // of no bodies: without effect
-}
-
-double bt_case_frame_damping(const bt_case *c)
-{
-    if (is_basin(c)) return 100;
-    const double stiffness = c->tow.line_stiffness / c->tow.line_length, period = bt_case_line_period(c);
-    // 2 ζ k/ω of each of parallel lines makes 2 ζ M ω of them all
-    return period > 0 ? LINE_DAMPING * stiffness * period / BT_PI : 0;
-}
-
-double bt_case_frame_rest_speed(const bt_case *c)
-{
-    return is_basin(c) ? 1e-3 : REST_SPEED * bt_case_reference_speed(c);
-}
 
 /// May the run use the value of this key?
 static bool is_used(const bt_case *c, const char *key, bool by_hand)

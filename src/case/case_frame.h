@@ -14,13 +14,4 @@ void bt_case_frame_clear(const bt_check *k, bool by_hand);
 /// may stay NaN: the file says whether it is needed.
 void bt_case_frame_check(const bt_check *k, bool by_hand);
 
-/// Mean floe size of a case in the geographic frame that makes and reads no ice, m: that of its floes, or the size of
-/// the body; NaN for other cases.
-double bt_case_frame_size(const bt_case *c);
-/// Damping of the tow line, N s/m: at sea a share of the critical damping of the body on its line or lines; 0 without
-/// a line.
-double bt_case_frame_damping(const bt_case *c);
-/// Speed of approach below which contacts have no restitution, m/s: at sea a share of the reference speed.
-double bt_case_frame_rest_speed(const bt_case *c);
-
 #endif

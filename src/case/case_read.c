@@ -106,7 +106,8 @@ static bool is_after_comma(reader *r, const bt_node *map, int i, const char *sec
         !is_nothing(map->item[i]))
         return false;
     bt_errors_add(r->err, "%s:%d: %s%s%.60s: %.20s,%.20s has a comma; write decimals with a point, as in %.20s.%.20s",
-                  r->path, map->key_line[i], section, *section ? "." : "", map->key[i - 1], left->text, map->key[i], left->text, map->key[i]);
+                  r->path, map->key_line[i], section, *section ? "." : "", map->key[i - 1], left->text, map->key[i],
+                  left->text, map->key[i]);
     return true;
 }
 

@@ -10,11 +10,11 @@
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
-#include "case/case_frame.h"
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
 enum { TIMES = 2000 };                 // of a run at which its planned track is looked at
+static const double DAMPING = 0.03;     // of critical, of a line at sea, assumed
 static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
@@ -200,6 +200,14 @@ void bt_case_tow_course(const bt_check *k)
         c->tow.direction = bt_atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
 }
 
+/// At sea: a share of the critical damping of the body on its line or lines, N s/m; 0 without a line.
+static double damping_of(const bt_case *c)
+{
+    const double stiffness = c->tow.line_stiffness / c->tow.line_length, period = bt_case_line_period(c);
+    // 2 ζ k/ω of each of parallel lines makes 2 ζ M ω of them all
+    return period > 0 ? DAMPING * stiffness * period / BT_PI : 0;
+}
+
 void bt_case_tow_follow(const bt_check *k)
 {
     bt_case *c = k->c;
@@ -217,7 +225,7 @@ void bt_case_tow_follow(const bt_check *k)
     bt_check_fill(&c->tow.branch2.length, c->tow.line_length);
     bt_check_fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
     bt_check_fill(&c->tow.branch2.breaking_load, c->tow.line.breaking_load);
-    bt_check_fill(&c->tow.line_damping, bt_case_frame_damping(c)); // by the stiffness of both branches
+    bt_check_fill(&c->tow.line_damping, at_sea ? damping_of(c) : 100); // by the stiffness of both branches
     bt_check_fill(&c->tow.branch2.damping, c->tow.line_damping);
     bt_check_fill(&c->tow.vessel.free_resistance, 0.4 * c->tow.vessel.bollard_pull);
     bt_check_fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
@@ -328,10 +336,10 @@ static void warn_of_short_run(const bt_case *c, bt_errors *warnings)
 {
     if (c->tow.mode == BT_TOW_NONE || c->tow.n_programme > 0 || !(c->tow.speed > 0)) return;
     if (c->tow.ramp < c->run.duration) return;
-    bt_errors_add(warnings,
-                  "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
-                  "lengthen run.duration, or give a shorter ramp",
-                  c->tow.ramp, c->run.duration);
+    bt_warn(warnings, BT_WARN_SHORT_RUN,
+            "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
+            "lengthen run.duration, or give a shorter ramp",
+            c->tow.ramp, c->run.duration);
 }
 
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings)

@@ -58,7 +58,8 @@ static const double PART = 0.05e-6, PAIR = 6e-9;
 double bt_cost_making(const bt_case *c, double floes)
 {
     if (!bt_case_makes_ice(c)) return 0;
-    const double x = c->ice.concentration, loose = bt_min(1, bt_max(0, (0.9 - x) / 0.3)); // 1 up to 60 %, 0 from 90 % on
+    const double x = c->ice.concentration;
+    const double loose = bt_min(1, bt_max(0, (0.9 - x) / 0.3)); // 1 up to 60 %, 0 from 90 % on
     const double shape = c->ice.shape == BT_ICE_RECTANGLES ? 0.75
                          : c->ice.shape == BT_ICE_POLYGONS ? bt_min(2.2, bt_max(0.8, 7 * x - 0.6))
                                                            : 1;

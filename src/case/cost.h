@@ -31,18 +31,18 @@ typedef struct bt_cost_ice {
 double bt_cost_making(const bt_case *c, double floes);
 
 /// Processor time of the steps of a run and of what they leave, s: 8 µs a step, bt_cost_floe_step a floe, 17 µs an
-/// entry of the series, 1 ms and 0.3 µs a floe a frame; of floes that are not convex 0.05 µs a part, and the pairs of parts of two floes,
-/// of which a floe has more neighbours the denser the ice is. Measured on runs of 1 to 260,000 steps, and on outlines of
-/// 12 to 120 corners in 3 to 80 parts.
+/// entry of the series, 1 ms and 0.3 µs a floe a frame; of floes that are not convex 0.05 µs a part, and the pairs of
+/// parts of two floes, of which a floe has more neighbours the denser the ice is. Measured on runs of 1 to 260,000
+/// steps, and on outlines of 12 to 120 corners in 3 to 80 parts.
 double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice);
 
 /// Both, of a case whose ice is made or given by hand.
 double bt_cost_seconds(const bt_case *c);
 
-/// Memory of a node with ranks_here of `size` ranks, B: 30 MB of the program and its libraries, 2 kB a floe (body arrays
-/// about 0.5 kB, contacts and lists about 1.5 kB in dense ice) and 0.45 kB a part of floes that are not convex, shared
-/// by the ranks, 0.2 kB a floe on each for the field at time zero; on one of them 0.3 kB a floe for the time of a
-/// checkpoint, what the summary keeps of every step, and what HDF5 keeps of each entry and frame.
+/// Memory of a node with ranks_here of `size` ranks, B: 30 MB of the program and its libraries, 2 kB a floe (body
+/// arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice) and 0.45 kB a part of floes that are not convex,
+/// shared by the ranks, 0.2 kB a floe on each for the field at time zero; on one of them 0.3 kB a floe for the time of
+/// a checkpoint, what the summary keeps of every step, and what HDF5 keeps of each entry and frame.
 double bt_cost_memory(const bt_case *c, double n_floes, double parts, int size, int ranks_here);
 
 /// Corners of all floes: of the field where one was read (f->n > 0, or f NULL), else as many as n floes of the shape

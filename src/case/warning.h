@@ -67,6 +67,8 @@
     ROW(STEEP_PROGRAMME, "steep_programme", "speed_m_s rise_s period_s least_s", "a rise of the speed jerks the line") \
     ROW(SHORT_RAMP, "short_ramp", "ramp_s period_s least_s", "the start jerks the line")                               \
     ROW(ODD_MASS, "odd_mass", "key ratio", "the body does not have the mass of the water that it displaces")           \
+    ROW(ODD_DRAFT, "odd_draft", "draft_m ratio width_m", "the body is so deep that it would capsize")                  \
+    ROW(SHORT_RUN, "short_run", "ramp_s duration_s", "the run ends within the ramp of the tow")                        \
     ROW(LONG_IMPACT, "long_impact", "duration_s steps", "collisions are taken to last longer than they do")            \
     ROW(TABLE_ROWS, "table_rows", "key dt_s rows first_s", "a table changes within less than a time step")             \
     ROW(LEAD_CORNERS, "lead_corners", "aside_m width_m", "the body leaves the lead at a corner of its way")            \

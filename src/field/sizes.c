@@ -64,9 +64,10 @@ void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors
         if (fabs(off) > SIZE_OFF * mean && fabs(off) > 2 * scatter)
             bt_warn(warnings, BT_WARN_MEAN_SIZE,
                     "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
-                    "wide spread small floes are drawn again, or find no place; lower ice.size_spread, or "
+                    "wide spread small floes are drawn again, or find no place; %s, or "
                     "count on the diameter that was made",
-                    (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less");
+                    (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less",
+                    s.law == BT_SIZE_POWER ? "narrow ice.size_min to size_max" : "lower ice.size_spread");
         const double spread = sqrt(bt_max(second - mean * mean, 0)) / mean;
         if (s.law != BT_SIZE_POWER && spread < (1 - SPREAD_OFF) * s.spread)
             bt_warn(warnings, BT_WARN_SPREAD,

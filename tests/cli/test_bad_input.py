@@ -78,16 +78,16 @@ TEXTS = {
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
     "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),
     "hexadecimal": (GOOD + "tow: {speed: 0x10}\n", 'bad.yml:5: tow.speed: "x10"'),
-    "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", "bad.yml:5: tow.speed: 0,13 has a comma; write decimals with a point, "
-                      "as in 0.13, and no sign between thousands"),
+    "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", "bad.yml:5: tow.speed: 0,13 has a comma; write decimals "
+                      "with a point, as in 0.13, and no sign between thousands"),
     "decimal comma without braces": (GOOD + "tow:\n  speed: 0,13 m/s\n", "bad.yml:6: tow.speed: 0,13 m/s has a comma",
                                      "as in 0.13 m/s,"),
-    "decimal comma in braces": (GOOD + "tow: {speed: 0,13 m/s, ramp: 1}\n", "bad.yml:5: tow.speed: 0,13 m/s has a comma",
-                                "as in 0.13 m/s"),
+    "decimal comma in braces": (GOOD + "tow: {speed: 0,13 m/s, ramp: 1}\n",
+                                "bad.yml:5: tow.speed: 0,13 m/s has a comma", "as in 0.13 m/s"),
     "decimal comma of a floe": (GOOD + "floes: [{x: 3, y: 1, length: 0,5}]\n",
                                 "bad.yml:5: floes[0].length: 0,5 has a comma", "as in 0.5"),
-    "comma between thousands": (GOOD + "tow:\n  ramp: 1,000 s\n", "bad.yml:6: tow.ramp: 1,000 s has a comma; write decimals "
-                                "with a point, and no sign between thousands"),
+    "comma between thousands": (GOOD + "tow:\n  ramp: 1,000 s\n", "bad.yml:6: tow.ramp: 1,000 s has a comma; "
+                                "write decimals with a point, and no sign between thousands"),
     "concentration in tenths": (GOOD.replace("0.3", "8"), "bad.yml:3: ice.concentration: 8 is out of range",
                                 "did you mean 0.8 (ice charts count tenths) or 8 %?"),
     "ten tenths": (GOOD.replace("0.3", "10"), "bad.yml:3: ice.concentration: 10 is out of range",

@@ -246,6 +246,13 @@ def test_defaults_that_follow_from_the_scene_at_sea(tmp_path):
     critical = 2 * np.sqrt(100e6 / 300 * mass)
     assert si(one["tow"]["line_damping"]) == pytest.approx(0.03 * critical, rel=1e-3)
     assert si(one["solver"]["rest_speed"]) == pytest.approx(0.005)
+    chosen = json.loads(call("check", write_case(tmp_path, MAP), "--json").stdout)["by_default"]
+    assert chosen["tow.line_damping"] == pytest.approx(si(one["tow"]["line_damping"]))
+    assert chosen["tow.ramp"] == pytest.approx(si(one["tow"]["ramp"])) and "tow.line_length" not in chosen
+    said = " ".join(call("check", tmp_path / "case.yml").stdout.split())
+    assert f"tow.line_damping {chosen['tow.line_damping']:.4g} N s/m, " in said
+    given = json.loads(call("check", tmp_path / "case.yml", "--json", "--set", "tow.line_damping=1").stdout)
+    assert "tow.line_damping" not in given["by_default"]
     two = resolved(changed(MAP, tow=tow | {"line": {"branches": 2}}), "two")
     assert si(two["tow"]["line_damping"]) == si(two["tow"]["branch2"]["damping"]) == pytest.approx(
         0.5 * 0.03 * np.sqrt(2) * critical, rel=1e-3)
@@ -278,7 +285,7 @@ def test_outlines_without_a_thickness(tmp_path):
     assert missing(tmp_path, case, "--set", "ice.thickness=1") == (DONE, [])
     assert missing(tmp_path, changed(case, domain__frame="basin", domain__x0=-1000)) == (DONE, [])
     text = "ice.thickness: is none where a value is needed"
-    assert text in call("check", write_case(tmp_path, changed(LOOSE, ice__thickness="none"))).stderr
+    assert text in call("check", write_case(tmp_path, LOOSE), "--set", "ice.thickness=none").stderr
 
 
 def test_no_case_runs_with_a_default_of_the_basin(tmp_path):

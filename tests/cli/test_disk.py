@@ -131,7 +131,8 @@ def test_the_memory_of_a_run_is_that_of_check(tmp_path, name):
     path = write_case(tmp_path, MEMORY[name])
     estimate = json.loads(call("check", path, "--json").stdout)["cost"]["memory_b"]
     # a small Python in between, for a process begins with the memory of the one that starts it
-    words = [sys.executable, "-S", "-c", LEAST, BERGTOW, "run", path, "-o", tmp_path / "out", "--threads", "1", "--quiet"]
+    words = [sys.executable, "-S", "-c", LEAST, BERGTOW, "run", path, "-o", tmp_path / "out", "--threads", "1",
+             "--quiet"]
     done = subprocess.run(list(map(str, words)), env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                           check=True)
     most = 1024 * int(done.stdout)
@@ -140,7 +141,8 @@ def test_the_memory_of_a_run_is_that_of_check(tmp_path, name):
 
 def test_check_says_what_the_making_of_ice_takes(tmp_path):
     """Red when nothing is said of minutes, of which none are steps."""
-    large = changed(BERG, run__duration=10, tow__ramp=1, domain__length=20e3, domain__width=20e3, ice__concentration=0.5)
+    large = changed(BERG, run__duration=10, tow__ramp=1, domain__length=20e3, domain__width=20e3,
+                    ice__concentration=0.5)
     path = write_case(tmp_path, large)
     cost = json.loads(call("check", path, "--json").stdout)["cost"]
     assert 120 < cost["making_of_ice_s"] < cost["core_time_s"]

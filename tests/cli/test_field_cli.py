@@ -252,6 +252,16 @@ def test_a_field_for_another_body_is_refused(tmp_path):
     assert "overlap" in moved.result.stderr
 
 
+def test_the_remedy_is_of_the_law_of_the_case(tmp_path):
+    """Red when a power law is told to lower ice.size_spread, which it has not."""
+    case = {"run": {"dt": 1, "duration": 5}, "domain": {"length": 1000, "width": 1000},
+            "ice": {"concentration": 0.6, "size_law": "power", "size_min": 5, "size_max": 250, "size_exponent": 1.8,
+                    "thickness": 0.8}, "body": {"shape": "none"}, "tow": {"mode": "none"}}
+    done = call("field", write_case(tmp_path, case), "-o", tmp_path / "f.h5")
+    assert "that of ice.size_law" in done.stdout and "narrow ice.size_min to size_max" in done.stdout
+    assert "ice.size_spread" not in done.stdout
+
+
 @pytest.mark.parametrize("spread, said", [(0.2, False), (1, True)])
 def test_sizes_that_are_not_those_of_the_law_are_said(tmp_path, spread, said):
     """At a wide spread small floes are drawn again or find no place; the mean diameter then is another."""

@@ -253,7 +253,8 @@ def test_a_turn_within_the_window_is_no_steady_tow(tmp_path):
         sharp, s = told(waypoints=points)
         assert sharp == (points[0][0] == 10) and "the course changes" not in reasons(s)
     # a carriage that passes the corner before the window, and the body behind it within
-    line = {"mode": "line", "line_length": 100, "line_stiffness": 10e3, "line_damping": 100, "waypoints": [[200, 0], [400, 200]]}
+    line = {"mode": "line", "line_length": 100, "line_stiffness": 10e3, "line_damping": 100,
+            "waypoints": [[200, 0], [400, 200]]}
     for start, said in ((200, True), (385, True), (620, False)):
         case = changed(BASE_TURN, output__window_start=start, run__duration=800, tow={**BASE_TURN["tow"], **line})
         said_so = run(tmp_path, case, "--quiet", "--force").reason

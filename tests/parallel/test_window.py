@@ -33,8 +33,8 @@ LINE = changed(SPEED,
                ice__concentration=0.35,
                ice__restitution=0,
                ice__seed=3,
-               tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 10e3, "line_damping": 100,
-                    "direction": 180},
+               tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 10e3,
+                    "line_damping": 100, "direction": 180},
                water={"latitude": 75, "current_x": 0.1},
                air={"wind_x": 5, "wind_y": 3})
 CASES = {"speed": SPEED, "line": LINE}

@@ -37,8 +37,8 @@ static void memory_by_hand(void **state)
     assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept + 1.25 * 32 * 36 * 3125, 1);
 }
 
-// By hand: 30 ms, a million steps of 8 µs, 100,000 entries of 17 µs, 501 frames of 1 ms and 0.3 µs a floe; 1000 floes of 0.8
-// µs at 50 %, and of 100 floes in 10 parts each 0.05 µs a part and 6 ns for half the pairs of them.
+// By hand: 30 ms, a million steps of 8 µs, 100,000 entries of 17 µs, 501 frames of 1 ms and 0.3 µs a floe; 1000 floes
+// of 0.8 µs at 50 %, and of 100 floes in 10 parts each 0.05 µs a part and 6 ns for half the pairs of them.
 static void time_by_hand(void **state)
 {
     (void)state;
