@@ -195,7 +195,8 @@ void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t
 
 void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b, const bt_map_axes *axes)
 {
-    *f = (bt_frames){.h = h, .comm = c, .axes = *axes, .n_floes = b->n_floes, .n_others = b->n_bodies - b->n_floes, .time = -1,
+    *f = (bt_frames){.h = h, .comm = c, .axes = *axes, .n_floes = b->n_floes,
+                     .n_others = b->n_bodies - b->n_floes, .time = -1,
                      .towed = b->towed < 0 ? -1 : b->towed - b->n_floes, .branches = b->branches, .line_points = -1,
                      .line_tension = -1};
     f->first = bt_comm_first(c, c->rank, b->n_floes);
