@@ -8,7 +8,7 @@ import numpy as np
 import map_repair
 from map_text import area
 
-MOST = 2 / 3        # of the ice, in one floe of several
+MOST = 3 / 4        # of the ice, in one floe of several
 NECK = 1 / 8        # of the size of a floe: narrower is a neck
 HEAD = 0.1          # of its area, on either side of a neck
 HUNG = 0.05         # of the ice, in floes with necks

@@ -4,10 +4,10 @@
     read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, what was imaged
 
 A label image is cut into connected regions of one value; each is a shape. (Regions that meet at a corner only are two.)
-Along pixels an outline would be a staircase, half of whose corners stick out of the shore. So each of its unit steps
-gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and since a closed ring has
-four more of the one than of the other, its area changes by half a pixel in all, whatever its length. Shapes that touch
-share these middles, so nothing opens or overlaps between them.
+Along pixels an outline would be a staircase, whose corners are no bays: map_stairs.py makes it straight, of an image and
+of outlines that were traced along pixels. Where that leaves nothing (of a crumb) or is not wanted, each unit step of an
+image gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and since a closed
+ring has four more of the one than of the other, its area changes by half a pixel in all, whatever its length.
 
 Libraries: osgeo alone, since GDAL reads outlines and images by the same call and both Debians have it. Rejected:
 fiona and rasterio, two packages over the same library for what is used of it here.
@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+import map_stairs
 from bergtow_read import RunError
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
@@ -55,6 +56,7 @@ class Reading:
     nodata: str = None      #: "water" or "unseen": what an image's nodata is where --water has its value, too
     unseen: tuple = ()      #: values of an image that say that nothing was seen there
     footprint: tuple = None #: corners of what was imaged, columns and rows of an image
+    stairs: str = "undo"    #: or "keep"
 
 
 @dataclass
@@ -66,6 +68,7 @@ class Shape:
     thickness: float = None     #: m
     cut: bool = False           #: by the edge of the image
     pixels: object = None       #: Polygon along the edges of its pixels, whose area an image has
+    straight: bool = False      #: its staircase was made straight
 
 
 @dataclass
@@ -157,11 +160,25 @@ def from_layer(path, source, how):
     except RuntimeError as error:
         raise RunError(path, f"cannot be read ({first_line(error)})",
                        "mend --where, or the file (ogrinfo tells more)") from None
+    if how.stairs == "undo":
+        retrace(found.shapes)
     if not found.shapes:
         others = sum(len(names) for names in found.skipped.values())
         raise RunError(path, f"holds no polygons ({others} features of other kinds)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     return found
+
+
+def retrace(shapes):
+    """Make the staircases of outlines straight that were traced along the pixels of an image."""
+    polygons = [s.geometry for s in shapes if s.geometry.geom_type == "Polygon"]
+    pixel = map_stairs.lattice(polygons) if polygons else None
+    for shape in shapes if pixel is not None else []:
+        new = map_stairs.retraced(shape.geometry, pixel) if shape.geometry.geom_type == "Polygon" else None
+        new = new and Polygon(new.exterior, shape.geometry.interiors)
+        if new and new.is_valid:
+            shape.pixels, shape.straight = Polygon(shape.geometry.exterior), True
+            shape.geometry = new
 
 
 def thickness_column(layer, columns):
@@ -260,14 +277,15 @@ def mark_cut(found, degrees):
     180th meridian, at which files in degrees part floes (RFC 7946), ends no map."""
     if found.seen is not None:
         return
-    bounds = np.array([s.geometry.bounds for s in found.shapes])
+    drawn = [s.pixels or s.geometry for s in found.shapes]
+    bounds = np.array([g.bounds for g in drawn])
     sides = np.r_[bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)]
     near = 1e-9 * max(sides[2] - sides[0], sides[3] - sides[1])
     for k in range(4):
         if degrees and k % 2 == 0 and abs(abs(sides[k]) - 180) <= near:
             continue
-        lying = [s for s, b in zip(found.shapes, bounds)
-                 if abs(b[k] - sides[k]) <= near and lies_on(s.geometry, k % 2, sides[k], near)]
+        lying = [s for s, g, b in zip(found.shapes, drawn, bounds)
+                 if abs(b[k] - sides[k]) <= near and lies_on(g, k % 2, sides[k], near)]
         for shape in lying if len(lying) > 1 else []:
             shape.cut = True
 
@@ -427,8 +445,9 @@ def of_labels(found, labels, valid, water, place, how):
     for polygon, number in regions(values, ice):
         value = label_of(number)
         name = f"label {value} at column {polygon.exterior.coords[0][0]:.0f}, row {polygon.exterior.coords[0][1]:.0f}"
-        found.shapes.append(Shape(name, placed(bevelled(polygon), place), thick.get(value), touches(polygon),
-                                  placed(Polygon(polygon.exterior), place)))
+        shore, is_straight = shore_of(polygon, how)
+        found.shapes.append(Shape(name, placed(shore, place), thick.get(value), touches(polygon),
+                                  placed(Polygon(polygon.exterior), place), is_straight))
     if not found.shapes:
         raise RunError(found.path, "holds no label of ice", f"say which values are water: --water (now {how.water})")
     found.seen, found.pixels = placed(edge, place), int(valid.sum())
@@ -467,6 +486,16 @@ def regions(values, mask):
     layer.CreateField(ogr.FieldDefn("value", ogr.OFTInteger))
     gdal.Polygonize(image.GetRasterBand(1), image.GetRasterBand(2), layer, 0)
     return [(wkb.loads(bytes(f.GetGeometryRef().ExportToWkb())), f.GetField(0)) for f in layer]
+
+
+def shore_of(polygon, how):
+    """(a region of pixels with its shore, was its staircase made straight)."""
+    middles = bevelled(polygon)
+    straight = map_stairs.straight(polygon) if how.stairs == "undo" else None
+    if straight is not None and polygon.interiors:
+        straight = Polygon(straight.exterior, middles.interiors)
+        straight = straight if straight.is_valid else None
+    return (middles, False) if straight is None else (straight, True)
 
 
 def bevelled(polygon):

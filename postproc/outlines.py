@@ -132,6 +132,8 @@ def arguments(argv):
     p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
                    "circle about the centre: room for the towed body, which may be on the map itself")
     p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: made straight "
+                   "within half a pixel, each floe keeping its area, or kept but for the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
@@ -206,7 +208,7 @@ def rules_of(a, found):
     """Lengths of the repair: of an image they follow from its pixels."""
     pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
     along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
-    return map_repair.Rules(tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
+    return map_repair.Rules(detail=a.tolerance or 0.0, tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
                             least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
                             keep_cut=a.cut == "keep", box=along, clear=a.clear)
 
@@ -259,7 +261,7 @@ def geojson(floes, found, plane):
 def main(argv=None):
     p, a = arguments(sys.argv[1:] if argv is None else argv)
     check_files(p, a)
-    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint, a.stairs)
     found = map_read.read(a.map, how)
     crs = map_plane.system(found.path, found.crs, a.crs, found.implied)
     plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
