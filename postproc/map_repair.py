@@ -263,7 +263,7 @@ def large_enough(floe, rules, book):
     if floe.polygon.buffer(-rules.tolerance / 2).is_empty:
         book.note("slivers", floe.name, area)
         return False
-    if area < rules.least:
+    if area < rules.least * (1 - 1e-9):  # of coordinates that are rounded
         book.note("small", floe.name, area)
         return False
     return True

@@ -16,7 +16,7 @@ import pytest
 import yaml
 from osgeo import gdal, ogr, osr
 from pyproj import Geod
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 import tutorial
@@ -27,6 +27,7 @@ from test_outlines import field, same_ring
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import map_read  # noqa: E402
+import map_stairs  # noqa: E402
 import outlines as command_line  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
@@ -355,6 +356,90 @@ def test_label_images(tmp_path):
     assert record["floes"]["with_thickness"] == 3 and record["map"]["crs"] == "local metres"
 
 
+def on_pixels(polygon, shape):
+    """Which pixels have their middle in a convex polygon."""
+    y, x = np.indices(shape) + 0.5
+    ring = np.asarray(polygon.exterior.coords)
+    side = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(ring, ring[1:])]
+    return (np.array(side) > 0).all(axis=0)
+
+
+def convex_polygons(rng, n, middle, radius):
+    for _ in range(n):
+        points = middle + rng.uniform(0.3, 1) * radius * regular(0, 0, 1, 9)[rng.permutation(9)[:6]] * [1, rng.uniform(.4, 1)]
+        a = rng.uniform(0, 7)
+        turned = (points - middle) @ [[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] + middle + rng.uniform(0, 1, 2)
+        yield Polygon(turned).convex_hull.buffer(0)
+
+
+def test_staircases_of_convex_shapes_become_convex():
+    """As few bays as the pixels allow: none. Every unit step lies within half a pixel of the shore, and so does the
+    polygon that was drawn. Red: Douglas & Peucker, with which 139 of 144 were not convex."""
+    rng = np.random.default_rng(3)
+    for drawn in convex_polygons(rng, 40, 45, 40):
+        drawn = drawn if drawn.exterior.is_ccw else Polygon(list(drawn.exterior.coords)[::-1])
+        labels = on_pixels(drawn, (92, 92)).astype(np.int32)
+        region = max((p for p, _ in map_read.regions(labels, labels > 0)), key=lambda p: p.area)
+        shore = map_stairs.straight(region)
+        assert shore.convex_hull.area < shore.area * (1 + 1e-9)
+        assert shore.area == pytest.approx(region.area, rel=5e-3)
+        steps = map_stairs.unit_steps(np.asarray(region.exterior.coords))
+        inner, outer = map_stairs.gates(*steps, 0.5)
+        corners, at = map_stairs.tight(inner, outer)
+        within = map_stairs.filled(corners, map_stairs.edge_room(corners, at, inner, outer), region.area, 1.0)
+        for ring, most in ((within, 0.5 + 1e-9), (shore.exterior.coords, 0.75)):  # before and after the rest of the area
+            assert max(Polygon(ring).exterior.distance(Point(m)) for m in steps[0]) < most
+        assert shore.symmetric_difference(drawn).area < 0.45 * drawn.length
+
+
+def test_bays_that_pixels_prove_stay():
+    labels = discs(np.zeros((80, 80), np.int32), (40, 40, 30, 1), (40, 66, 12, 0))
+    (region, _), = map_read.regions(labels, labels > 0)
+    shore = map_stairs.straight(region)
+    bay = shore.convex_hull.difference(shore)
+    assert shore.area == pytest.approx(region.area, rel=1e-3) and bay.area > 150 and bay.geom_type == "Polygon"
+    square, = (p for p, _ in map_read.regions(np.ones((7, 9), np.int32), np.ones((7, 9), bool)))
+    assert map_stairs.straight(square).symmetric_difference(square).area < 0.02 * square.area
+
+
+@pytest.mark.parametrize("pixel", [(1.0, 1.0), (0.0133, 0.0133), (3.0, 2.0)])
+@pytest.mark.parametrize("middles", [False, True])
+def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles):
+    """Along the edges of pixels, as GDAL polygonizes, or from middle to middle, as contours of images run, rounded:
+    convex, each with its area and the names of those that an image's edge cut. Red: 517 floes of a public map in 5,760
+    convex parts, by this 613."""
+    rng = np.random.default_rng(8)
+    rings = []
+    for k, drawn in enumerate(convex_polygons(rng, 12, 30, 27)):
+        drawn = drawn if drawn.exterior.is_ccw else Polygon(list(drawn.exterior.coords)[::-1])
+        labels = on_pixels(drawn, (64, 64)).astype(np.int32)
+        region = max((p for p, _ in map_read.regions(labels, labels > 0)), key=lambda p: p.area)
+        ring = np.asarray(region.exterior.coords)[:-1]
+        if middles:
+            inner, _ = map_stairs.gates(*map_stairs.unit_steps(np.asarray(region.exterior.coords)), 0.5)
+            ring = inner[np.r_[True, np.abs(np.diff(inner, axis=0)).sum(axis=1) > 0]]
+            ring = ring if np.abs(ring[0] - ring[-1]).sum() else ring[:-1]
+        rings.append(np.round((ring + (70 * (k % 4), 70 * (k // 4))) * pixel, 5))
+    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    got, record = outlines(map_, "--heading", 90)
+    assert counted(record)["stairs"] == 12 and record["floes"]["convex"] >= 11
+    assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-4)
+    for a, b in zip(got, rings):
+        assert plane_area(a) == pytest.approx(plane_area(b), rel=1e-3)
+    kept, record = outlines(map_, "--heading", 90, "--stairs", "keep")
+    assert "stairs" not in counted(record) and record["floes"]["convex"] == 0
+    assert sum(map(len, kept)) > 2 * sum(map(len, got))
+
+
+def test_outlines_drawn_by_hand_are_no_staircases(tmp_path):
+    """Boxes on a grid, polygons of any kind: as they are."""
+    boxes = [np.array([[0, 0], [20, 0], [20, 30], [10, 30], [10, 20], [0, 20]]) + (50 * k, 10 * k) for k in range(6)]
+    for rings in (boxes, RINGS):
+        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.LOCAL), "--centre", "0,0")
+        assert "stairs" not in counted(record)
+        assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-9)
+
+
 def test_middles_of_steps_keep_the_area():
     """Of a region of pixels all but half of one, however long its shore is, and another half for each pond."""
     labels = discs(np.zeros((90, 90), np.int32), (45, 45, 40, 1), (45, 45, 12, 0), (20, 45, 5, 0))
@@ -393,7 +478,7 @@ def test_small_floes_count_by_their_pixels(tmp_path):
     np.save(tmp_path / "map.npy", labels)
     rings, record = outlines(tmp_path / "map.npy", "--pixel", "1")
     assert sorted(plane_area(r) for r in rings) == pytest.approx([4, 6, 6], rel=2e-6)
-    assert record["changes"]["small"]["count"] == 2 and record["changes"]["small"]["area_before_m2"] == 6
+    assert record["changes"]["small"]["count"] == 2 and record["changes"]["small"]["area_before_m2"] == pytest.approx(6)
 
 
 def test_nodata_that_is_water(tmp_path):
@@ -643,7 +728,7 @@ def test_what_of_an_image_was_seen(tmp_path):
         x, y = columns + 0.5 - 60 - middle[0], 50 - rows - 0.5 - middle[1]
         part = seen & (x > x0) & (x < x1) & (y > y0) & (y < y1)
         assert record["floes"]["concentration"] == pytest.approx(np.count_nonzero(labels) / np.count_nonzero(part),
-                                                                 rel=0.01)
+                                                                 rel=0.025)
         assert record["floes"]["imaged_share"] == pytest.approx(np.count_nonzero(part) / (x1 - x0) / (y1 - y0), rel=0.02)
     assert share < 0.5
     tif = image(tmp_path / "c.tif", black, nodata=9)
