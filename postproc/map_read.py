@@ -4,10 +4,10 @@
     read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, what was imaged
 
 A label image is cut into connected regions of one value; each is a shape. (Regions that meet at a corner only are two.)
-Along pixels an outline would be a staircase, whose corners are no bays: map_stairs.py makes it straight, of an image and
-of outlines that were traced along pixels. Where that leaves nothing (of a crumb) or is not wanted, each unit step of an
-image gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and since a closed
-ring has four more of the one than of the other, its area changes by half a pixel in all, whatever its length.
+Along pixels an outline would be a staircase, whose corners are no bays: map_stairs.py makes it straight, that of an
+image and that of outlines which were traced along pixels. Where this leaves nothing (of a crumb) or is not wanted, each
+unit step of an image gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and
+since a closed ring has four more of the one than of the other, its area changes by half a pixel in all.
 
 Libraries: osgeo alone, since GDAL reads outlines and images by the same call and both Debians have it. Rejected:
 fiona and rasterio, two packages over the same library for what is used of it here.

@@ -261,7 +261,8 @@ def geojson(floes, found, plane):
 def main(argv=None):
     p, a = arguments(sys.argv[1:] if argv is None else argv)
     check_files(p, a)
-    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint, a.stairs)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint,
+                           a.stairs)
     found = map_read.read(a.map, how)
     crs = map_plane.system(found.path, found.crs, a.crs, found.implied)
     plane = map_plane.Plane.of(found, crs, a.centre, a.heading)

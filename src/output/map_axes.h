@@ -19,7 +19,10 @@ typedef struct bt_map_axes {
 bt_map_axes bt_map_axes_of(const bt_case *c, const bt_outline_counts *o);
 
 /// Of the two axes, for a reader of the file.
-static inline const char *bt_map_axes_names(const bt_map_axes *a) { return a->swapped ? "east (y), north (x)" : "x, y"; }
+static inline const char *bt_map_axes_names(const bt_map_axes *a)
+{
+    return a->swapped ? "east (y), north (x)" : "x, y";
+}
 
 /// x, y of the case as drawn, m.
 static inline void bt_map_axes_point(const bt_map_axes *a, double x, double y, double drawn[2])

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The frames for ParaView: an XML description of what is in result.h5.
 //
-// ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame as they are drawn (map_axes.h),
-// in single precision; the polygons never change, and their connectivity is stored once:
+// ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame as they are drawn, in single
+// precision (map_axes.h); the polygons never change, and their connectivity is stored once:
 //     /xdmf/floes, /xdmf/bodies     mixed topology
 //     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
 //     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN

@@ -366,7 +366,8 @@ def on_pixels(polygon, shape):
 
 def convex_polygons(rng, n, middle, radius):
     for _ in range(n):
-        points = middle + rng.uniform(0.3, 1) * radius * regular(0, 0, 1, 9)[rng.permutation(9)[:6]] * [1, rng.uniform(.4, 1)]
+        points = middle + rng.uniform(0.3, 1) * radius * regular(0, 0, 1, 9)[rng.permutation(9)[:6]] * [
+            1, rng.uniform(.4, 1)]
         a = rng.uniform(0, 7)
         turned = (points - middle) @ [[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] + middle + rng.uniform(0, 1, 2)
         yield Polygon(turned).convex_hull.buffer(0)
@@ -387,7 +388,8 @@ def test_staircases_of_convex_shapes_become_convex():
         inner, outer = map_stairs.gates(*steps, 0.5)
         corners, at = map_stairs.tight(inner, outer)
         within = map_stairs.filled(corners, map_stairs.edge_room(corners, at, inner, outer), region.area, 1.0)
-        for ring, most in ((within, 0.5 + 1e-9), (shore.exterior.coords, 0.75)):  # before and after the rest of the area
+        # before and after it takes the rest of the area
+        for ring, most in ((within, 0.5 + 1e-9), (shore.exterior.coords, 0.75)):
             assert max(Polygon(ring).exterior.distance(Point(m)) for m in steps[0]) < most
         assert shore.symmetric_difference(drawn).area < 0.45 * drawn.length
 
@@ -571,8 +573,8 @@ UNSAID = {
         p / "map.geojson", rings, "urn:ogc:def:crs:OGC:1.3:CRS84"),
     "GeoJSON in EPSG:4326": lambda p, rings: write(p / "map.geojson", rings, "EPSG:4326"),
     "lines of GeoJSON": lambda p, rings: text(p / "map.geojsonl", "".join(json.dumps({
-        "type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [[*r.tolist(), r[0].tolist()]]
-                                                          }}) + "\n" for r in rings)),
+        "type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
+            [*r.tolist(), r[0].tolist()]]}}) + "\n" for r in rings)),
     "GeoPackage, undefined geographic": lambda p, rings: geopackage(p / "map.gpkg", rings, 0),
     "GeoPackage, undefined Cartesian": lambda p, rings: geopackage(p / "map.gpkg", rings, -1),
 }
@@ -729,7 +731,8 @@ def test_what_of_an_image_was_seen(tmp_path):
         part = seen & (x > x0) & (x < x1) & (y > y0) & (y < y1)
         assert record["floes"]["concentration"] == pytest.approx(np.count_nonzero(labels) / np.count_nonzero(part),
                                                                  rel=0.025)
-        assert record["floes"]["imaged_share"] == pytest.approx(np.count_nonzero(part) / (x1 - x0) / (y1 - y0), rel=0.02)
+        assert record["floes"]["imaged_share"] == pytest.approx(np.count_nonzero(part) / (x1 - x0) / (y1 - y0),
+                                                                rel=0.02)
     assert share < 0.5
     tif = image(tmp_path / "c.tif", black, nodata=9)
     assert outlines(tif, "--crs", "local", "--unseen", "9")[1]["floes"]["floes"] == 3
