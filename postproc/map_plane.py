@@ -49,8 +49,9 @@ def vertices(geometry):
 # ---- which system
 
 
-def system(path, found, said):
-    """The crs of a map: a pyproj.CRS, or LOCAL. found, said: of the file and of --crs, or None. Errors: RunError."""
+def system(path, found, said, implied=False):
+    """The crs of a map: a pyproj.CRS, or LOCAL. found, said: of the file and of --crs, or None; implied: that of the
+    file says no more than its format, and gives way to --crs. Errors: RunError."""
     if MISSING:
         raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
     ours = None if said is None else LOCAL if said in ("local", LOCAL) else known(path, said, "--crs")
@@ -59,6 +60,8 @@ def system(path, found, said):
         raise RunError(path, "says no coordinate reference system", SAY)
     if theirs is None or ours is None:
         return theirs or ours
+    if implied:
+        return ours
     local = isinstance(theirs, str), isinstance(ours, str)
     if local[0] != local[1] or not local[0] and not same(theirs, ours):
         raise RunError(path, f"is in {name_of(theirs)}, and --crs says {name_of(ours)}",
@@ -93,8 +96,8 @@ def name_of(crs):
     return f"{':'.join(code)} ({crs.name})" if code else crs.name
 
 
-def hold_against(path, crs, xy):
-    """Refuse coordinates that contradict their system. xy: of all shapes, (n, 2)."""
+def hold_against(path, crs, xy, implied=False):
+    """Refuse coordinates that contradict their system. xy: of all shapes, (n, 2); implied: as in `system`."""
     far, span = np.abs(xy).max(axis=0), np.ptp(xy, axis=0)
     if isinstance(crs, str):
         return
@@ -105,8 +108,7 @@ def hold_against(path, crs, xy):
             swapped = x <= 90 and y <= 360
             raise RunError(path, f"is in {name_of(crs)}, degrees, and has coordinates up to {far[0]:.6g}, {far[1]:.6g}",
                            "latitude seems to come first: swap them" if swapped else
-                           "they look like metres: correct its crs (ogr2ogr -a_srs), or say it with --crs where the "
-                           "file has none")
+                           "they look like metres: " + (SAY if implied else "correct its crs (ogr2ogr -a_srs)"))
     elif (far * unit <= (180, 90)).all():
         raise RunError(path, f"is in {name_of(crs)}, metres, and all its coordinates lie within {span[0]:.3g} of "
                        f"{xy[0][0]:.6g}, {xy[0][1]:.6g}, as degrees do",
@@ -131,7 +133,7 @@ class Plane:
     def of(found, crs, centre, heading):
         """The plane of a map, about the centre or about the middle of what it holds. Errors: RunError."""
         xy = np.concatenate([vertices(s.geometry) for s in found.shapes])
-        hold_against(found.path, crs, xy)
+        hold_against(found.path, crs, xy, found.implied)
         plane = Plane(crs, centre, heading)
         if isinstance(crs, str):
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)

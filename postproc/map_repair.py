@@ -16,7 +16,7 @@ through the overlap, which changes both, and of three floes depends on the order
 Floes that touch are drawn apart by a gap of GAP: two that share an edge to the last bit, as neighbours of one label
 image do, have no side to which they part, and the reader takes corners of their convex parts for overlaps.
 
-Of a label image the area of a floe is that of its pixels. Simplifying takes the bevelled corners (2.5 % of a square
+Of an image the area of a floe is that of its pixels. Simplifying takes the bevelled corners (2.5 % of a square
 of 40 pixels, 15 % of one of 6), so the shore moves out again by as much as keeps the area; where two floes touch, what
 they then share is an overlap as any.
 
@@ -55,6 +55,7 @@ KINDS = {
     "holes": "floes with holes, filled",
     "outside": "floes with their middle outside the box, left out",
     "clear": "floes in the clear circle, left out",
+    "stairs": "staircases of pixels made straight",
     "simplified": "outlines simplified to the tolerance",
     "slivers": "slivers narrower than the tolerance, left out",
     "small": "floes smaller than --least, left out",
@@ -101,7 +102,8 @@ class Floe:
     polygon: object
     thickness: float = None
     cut: bool = False
-    pixels: float = None        #: area of its pixels, m², of a label image
+    pixels: float = None        #: area of its pixels, m²
+    straight: bool = False      #: its staircase was made straight
 
 
 @dataclass
@@ -109,6 +111,7 @@ class Rules:
     """Lengths in metres, areas in square metres."""
 
     tolerance: float = None     #: None: a thousandth of the mean size
+    detail: float = 0.0         #: the same for shores that were made straight; 0: they stay
     least: float = 0.0
     keep_cut: bool = True
     box: tuple = None           #: length along the first axis and width, about the centre
@@ -165,7 +168,7 @@ def whole(shape, book):
         book.note("several", shape.name, area, area)
     pixels = shape.pixels.area if shape.pixels is not None and len(parts) == 1 else None
     names = [shape.name] if len(parts) == 1 else [f"{shape.name}, part {k + 1}" for k in range(len(parts))]
-    return [Floe(name, filled(p, name, book), shape.thickness, shape.cut, pixels)
+    return [Floe(name, filled(p, name, book), shape.thickness, shape.cut, pixels, shape.straight)
             for name, p in zip(names, parts)]
 
 
@@ -199,12 +202,14 @@ def chosen(floe, rules, book):
 def simplified(floe, rules, book):
     """With fewer vertices: by Douglas & Peucker, no vertex farther from the new outline than the tolerance; more of
     it where there are too many. What this takes from the corners of a label the shore gets back."""
-    before, tolerance = floe.polygon, rules.tolerance
-    polygon = with_area(before.simplify(tolerance), floe.pixels)
+    before, tolerance = floe.polygon, rules.detail if floe.straight else rules.tolerance
+    polygon = with_area(before.simplify(tolerance) if tolerance else before, floe.pixels)
+    if floe.straight:
+        book.note("stairs", floe.name, floe.pixels or before.area, polygon.area)
     if len(polygon.exterior.coords) < len(before.exterior.coords):
         book.note("simplified", floe.name, floe.pixels or before.area, polygon.area)
     if too_many(polygon):
-        first, polygon = polygon.area, with_area(fewer(before, tolerance), floe.pixels)
+        first, polygon = polygon.area, with_area(fewer(before, rules.tolerance), floe.pixels)
         book.note("vertices", floe.name, first, polygon.area)
     return opened(replace(floe, polygon=polygon), rules, book)
 
@@ -258,7 +263,7 @@ def large_enough(floe, rules, book):
     if floe.polygon.buffer(-rules.tolerance / 2).is_empty:
         book.note("slivers", floe.name, area)
         return False
-    if area < rules.least:
+    if area < rules.least * (1 - 1e-9):  # of coordinates that are rounded
         book.note("small", floe.name, area)
         return False
     return True

@@ -20,8 +20,11 @@ def length(value):
     return f"{value / 1e3:.4g} km" if value >= 1e3 else f"{value:.4g} m"
 
 
-def map_lines(found, crs):
+def map_lines(found, crs, said=None):
     lines = [f"map: {len(found.shapes)} shapes in {name_of(crs)}"]
+    if said and (found.crs is None or found.implied):
+        lines.append("crs: as --crs says; the file " + (
+            "names none" if found.crs is None else "is in degrees only by the default of GeoJSON"))
     if found.about:
         lines.append(f"the file says of itself: {found.about}")
     if found.near:

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import command
+import map_doubts
 import map_plane
 import map_read
 import map_repair
@@ -80,6 +81,17 @@ def integers(text):
         raise argparse.ArgumentTypeError(f"{text}: are no labels; write whole numbers, 0,3") from None
 
 
+def corners(text):
+    """X,Y,X,Y,..."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"{text}: are no corners; write at least three, column,row,column,row,...")
+    return tuple(zip(numbers[::2], numbers[1::2]))
+
+
 def angle(text):
     try:
         value = float(text)
@@ -102,7 +114,7 @@ def arguments(argv):
                    "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
     p.add_argument("--crs", help="what the coordinates are where the file does not say it: EPSG:..., any other name "
                    "that PROJ knows, or local: metres east and north of no place on the earth")
-    p.add_argument("--layer", metavar="NAME", help="which layer, of several")
+    p.add_argument("--layer", metavar="NAME", help="which layer, of several; of a NetCDF or HDF5 file which grid")
     p.add_argument("--where", metavar="SQL", help="only features for which this holds, e.g. \"kind = 'ice'\"")
     p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
                    "image the thickness by label: 1=0.5,2=1.2")
@@ -110,6 +122,10 @@ def arguments(argv):
                    "(default 0); each connected region of another one is a floe")
     p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is (default: unseen; to be "
                    "named where --water has the same value)")
+    p.add_argument("--unseen", metavar="N,...", type=integers, default=(), help="labels of an image that say that "
+                   "nothing was seen there")
+    p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of what was imaged, as columns "
+                   "and rows of the image from its upper left; all around was not seen")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
@@ -117,6 +133,8 @@ def arguments(argv):
     p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
                    "circle about the centre: room for the towed body, which may be on the map itself")
     p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: made straight "
+                   "within half a pixel, each floe keeping its area, or kept but for the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
@@ -124,8 +142,8 @@ def arguments(argv):
     p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
     command.add_force(p)
     words = list(argv)
-    for k, word in enumerate(words[:-1]):  # a western longitude is no option
-        if word in ("--centre", "--heading") and words[k + 1][:1] == "-":
+    for k, word in enumerate(words[:-1]):  # a western longitude is no option, nor is a negative label
+        if word in ("--centre", "--heading", "--water", "--unseen", "--footprint") and words[k + 1][:1] == "-":
             words[k:k + 2] = [f"{word}={words[k + 1]}", ""]
     return p, p.parse_args([word for word in words if word])
 
@@ -191,7 +209,7 @@ def rules_of(a, found):
     """Lengths of the repair: of an image they follow from its pixels."""
     pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
     along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
-    return map_repair.Rules(tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
+    return map_repair.Rules(detail=a.tolerance or 0.0, tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
                             least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
                             keep_cut=a.cut == "keep", box=along, clear=a.clear)
 
@@ -244,9 +262,10 @@ def geojson(floes, found, plane):
 def main(argv=None):
     p, a = arguments(sys.argv[1:] if argv is None else argv)
     check_files(p, a)
-    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint,
+                           a.stairs)
     found = map_read.read(a.map, how)
-    crs = map_plane.system(found.path, found.crs, a.crs)
+    crs = map_plane.system(found.path, found.crs, a.crs, found.implied)
     plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
     map_read.mark_cut(found, degrees=not isinstance(crs, str) and crs.is_geographic)
     book = map_repair.Ledger()
@@ -256,7 +275,7 @@ def main(argv=None):
     bend = in_plane(found, plane)
     rules = rules_of(a, found)
     floes = map_repair.repaired(found.shapes, rules, book)
-    print("\n".join(map_text.map_lines(found, crs)))
+    print("\n".join(map_text.map_lines(found, crs, a.crs)))
     if not floes:
         print("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
@@ -273,11 +292,14 @@ def main(argv=None):
     print(f"tolerance: {map_text.length(rules.tolerance)}")
     print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
     command.write_text(geojson(floes, found, plane), a.output, a.force)
+    doubts = map_doubts.doubts(found, floes, book)
+    for doubt in doubts:
+        print(f"warning: {doubt['text']}")
     print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN,
                                         None if isinstance(crs, str) else plane.centre[1])))
     print(a.output)
     if a.record:
-        record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers)
+        record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers) | {"warnings": doubts}
         command.write_json(record, a.record, a.force)
         print(a.record)
     if a.picture:

@@ -54,6 +54,8 @@ static inline bt_case made_up_case(void)
     c.tow.mode = BT_TOW_SPEED;
     c.tow.ramp = 0;
     c.domain.width = 100; // 50 body widths: no arches
+    c.domain.x0 = 0;
+    c.domain.y0 = -50;
     c.output.sample_every = 1;
     c.output.window_start = -1;
     c.reference.mean_force = 500;

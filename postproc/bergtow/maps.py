@@ -46,7 +46,8 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
         case = bergtow.Case({"ice": {"outlines": "floes.geojson", ...}, ...})
 
     file: GeoJSON to write. options: those of `bergtow outlines`, where pairs may be tuples: centre, heading, crs,
-    layer, where, thickness, water, band, pixel, box, clear, cut, tolerance, least. Needs GDAL, pyproj and shapely.
+    layer, where, thickness, water, unseen, footprint, band, pixel, box, clear, cut, stairs, tolerance, least. Needs
+    GDAL, pyproj and shapely.
     Errors: BergtowError, with what to say of a map that is not understood.
     """
     known = {name: ",".join(str(v) for v in value) if isinstance(value, (list, tuple)) else value

@@ -318,7 +318,10 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, b
     if (checked != BT_OK) return checked;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     if (H5Fis_hdf5(path) <= 0) {
-        bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);
+        bt_errors_add(err,
+                      "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
+                      "outlines (GeoJSON) with ice.outlines",
+                      path);
         return BT_ERR_CASE;
     }
     int errnum = 0; // of a read that failed: then what was found in the file says nothing of it

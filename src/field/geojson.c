@@ -35,6 +35,7 @@
 #include "base/largest.h"
 #include "field/map_crs.h"
 #include "field/map_features.h"
+#include "field/map_place.h"
 #include "base/suggest.h"
 
 static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
@@ -580,8 +581,7 @@ bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err)
 typedef struct map {
     const bt_field *f;
     const bt_case *c;
-    bool degrees;
-    double lon0, lat0, east0, north0; ///< rad; m
+    bt_map_place place;
 } map;
 
 /// A vertex of the case's frame as it stands in the file.
@@ -589,9 +589,9 @@ static void write_position(FILE *out, const map *m, double x, double y)
 {
     const bool basin = m->c->domain.frame == BT_FRAME_BASIN;
     const double east = basin ? x : y, north = basin ? y : x;
-    double first = m->east0 + east, second = m->north0 + north;
-    if (m->degrees) {
-        bt_outline_unproject(north, east, m->lon0, m->lat0, &first, &second);
+    double first = m->place.first + east, second = m->place.second + north;
+    if (m->place.kind == BT_MAP_DEGREES) {
+        bt_outline_unproject(north, east, m->place.first, m->place.second, &first, &second);
         first /= DEGREE, second /= DEGREE;
     }
     fprintf(out, "[%.17g,%.17g]", first, second);
@@ -625,29 +625,18 @@ bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const cha
     bt_text lines;
     bt_text_begin(&lines);
     FILE *out = lines.out;
-    const bt_outline_counts *o = &f->outlines;
-    const bt_map_crs from = bt_map_crs_of(o->crs);
-    const bool lonlat = o->read && isfinite(o->lon), projected = o->read && from.kind == BT_MAP_PLANE,
-               plane = o->read && isfinite(o->east);
-    const bool known = lonlat || (!projected && !isnan(c->ice.origin_lon));
-    const map m = {
-        .f = f,
-        .c = c,
-        .degrees = known,
-        .lon0 = lonlat ? o->lon : c->ice.origin_lon,
-        .lat0 = lonlat ? o->lat : c->ice.origin_lat,
-        .east0 = plane ? o->east : 0,
-        .north0 = plane ? o->north : 0,
-    };
+    const bt_map_place place = bt_map_place_of(&f->outlines, c);
+    const bool known = place.kind == BT_MAP_DEGREES;
+    const map m = {.f = f, .c = c, .place = place};
     fprintf(out,
             HEAD "{\"version\":\"%s\",\"coordinates\":\"%s\",\"origin\":[%.17g,%.17g],\"frame\":\"%s\",\"ice_"
                  "area_m2\":%.17g},\n",
             BT_VERSION, known ? "longitude and latitude, degrees" : "east and north, metres",
-            known ? m.lon0 / DEGREE : m.east0, known ? m.lat0 / DEGREE : m.north0,
+            known ? place.first / DEGREE : place.first, known ? place.second / DEGREE : place.second,
             c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", f->ice_area);
     if (!known)
         fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
-                projected ? o->crs : BT_MAP_LOCAL_NAME);
+                place.crs ? place.crs : BT_MAP_LOCAL_NAME);
     fprintf(out, "\"features\":[");
     for (bt_idx i = 0; i < f->n; i++) write_floe(out, &m, i);
     fprintf(out, "\n]}\n");

@@ -288,12 +288,43 @@ static bool split(bt_features *f)
     return f->root != NULL;
 }
 
+/// What a file is that is no JSON, by the bytes at its beginning, or NULL.
+static const char *other_format(const char *text, size_t size)
+{
+    static const struct { size_t n; const char *bytes, *name; } kinds[] = {
+        {4, "\0\0\x27\x0a", "a shapefile"},
+        {15, "SQLite format 3", "a GeoPackage or another SQLite file"},
+        {4, "\x89PNG", "an image (PNG)"},
+        {3, "\xff\xd8\xff", "an image (JPEG)"},
+        {4, "II*\0", "an image (TIFF)"},
+        {4, "MM\0*", "an image (TIFF)"},
+        {4, "II+\0", "an image (BigTIFF)"},
+        {6, "\x93NUMPY", "an array of numpy"},
+        {3, "CDF", "a grid (NetCDF)"},
+        {4, "\x89HDF", "a grid (HDF5 or NetCDF)"},
+        {4, "PK\3\4", "a zip archive (KMZ, shapefile)"},
+        {1, "<", "XML (KML, GML)"},
+    };
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+        if (size >= kinds[k].n && !memcmp(text, kinds[k].bytes, kinds[k].n))
+            return kinds[k].name;
+    return NULL;
+}
+
 bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
 {
     *f = (bt_features){0};
     bt_status status =
         bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &f->text, &f->size, err);
     if (status != BT_OK) return status;
+    const char *other = other_format(f->text, f->size);
+    if (other) {
+        bt_errors_add(err,
+                      "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
+                      "bergtow belongs to ice.field)",
+                      path, other, path);
+        return BT_ERR_CASE;
+    }
     // What a hostile file could make of it is known before: a tree takes far more room than the text.
     int64_t lists = 0;
     const char *c = f->text, *end = f->text + f->size;

@@ -22,11 +22,15 @@ static void write_copy(bt_slab *s, int64_t first, int64_t n, const void *rows)
     if (n > 0) bt_slab_write(s, first, n, rows);
 }
 
-typedef struct outlines { bt_slab vertices, offsets, thickness, area, topology; } outlines;
+typedef struct outlines {
+    bt_slab vertices, offsets, thickness, area, topology;
+    bool mirrored; ///< as drawn the vertices run clockwise
+} outlines;
 
-static outlines create_outlines(bt_h5 *h, const char *group, const char *height, const char *topology, int64_t n,
+static outlines create_outlines(bt_frames *f, const char *group, const char *height, const char *topology, int64_t n,
                                 int64_t n_vertices)
 {
+    bt_h5 *h = f->h;
     char path[64];
 #define NAMED(name) (snprintf(path, sizeof path, "%s/%s", group, name), path)
     outlines o = {
@@ -36,9 +40,22 @@ static outlines create_outlines(bt_h5 *h, const char *group, const char *height,
         .area = bt_slab_fixed(h, NAMED("area"), H5T_NATIVE_DOUBLE, n, 0, false),
         // Vertex numbers in XDMF are of 32 bits here: enough for 2^31 vertices a block.
         .topology = bt_slab_fixed(h, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
+        .mirrored = f->axes.swapped,
     };
 #undef NAMED
     return o;
+}
+
+/// What ParaView's coordinates are.
+static void describe_axes(bt_h5 *h, const bt_map_axes *a)
+{
+    bt_h5_attr_text(h, "/xdmf", "axes", bt_map_axes_names(a));
+    bt_h5_attr_double(h, "/xdmf", "origin_x", a->origin[0]);
+    bt_h5_attr_double(h, "/xdmf", "origin_y", a->origin[1]);
+    if (!*a->crs) return;
+    bt_h5_attr_text(h, "/xdmf", "crs", a->crs);
+    bt_h5_attr_double(h, "/xdmf", "origin_east", a->crs_place[0]);
+    bt_h5_attr_double(h, "/xdmf", "origin_north", a->crs_place[1]);
 }
 
 static void describe(bt_h5 *h, const bt_record_bodies *b)
@@ -81,7 +98,8 @@ static void write_outlines(outlines *o, const bt_record_bodies *b, int64_t from,
         const int64_t count = offsets[i + 1] - offsets[i];
         *(int32_t *)bt_rows_next(&r) = BT_XDMF_POLYGON;
         *(int32_t *)bt_rows_next(&r) = (int32_t)count;
-        for (int64_t v = 0; v < count; v++) *(int32_t *)bt_rows_next(&r) = (int32_t)(before + offsets[i] - v0 + v);
+        for (int64_t v = 0; v < count; v++)
+            *(int32_t *)bt_rows_next(&r) = (int32_t)(before + offsets[i] - v0 + (o->mirrored ? count - 1 - v : v));
     }
     bt_rows_end(&r);
 }
@@ -107,8 +125,9 @@ static void write_bodies(bt_frames *f, const bt_record_bodies *b)
     bt_h5_group(h, "/floes");
     bt_h5_group(h, "/bodies");
     bt_h5_group(h, "/xdmf");
-    outlines o[2] = {create_outlines(h, "/floes", "thickness", "/xdmf/floes", f->n_floes, f->floe_vertices),
-                     create_outlines(h, "/bodies", "height", "/xdmf/bodies", f->n_others, f->other_vertices)};
+    outlines o[2] = {create_outlines(f, "/floes", "thickness", "/xdmf/floes", f->n_floes, f->floe_vertices),
+                     create_outlines(f, "/bodies", "height", "/xdmf/bodies", f->n_others, f->other_vertices)};
+    describe_axes(h, &f->axes);
     describe(h, b);
     bt_slab *all[] = {&o[0].vertices, &o[0].offsets, &o[0].thickness, &o[0].area, &o[0].topology,
                       &o[1].vertices, &o[1].offsets, &o[1].thickness, &o[1].area, &o[1].topology};
@@ -174,9 +193,10 @@ void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t
     first[c->size] = n_bodies;
 }
 
-void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b)
+void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b, const bt_map_axes *axes)
 {
-    *f = (bt_frames){.h = h, .comm = c, .n_floes = b->n_floes, .n_others = b->n_bodies - b->n_floes, .time = -1,
+    *f = (bt_frames){.h = h, .comm = c, .axes = *axes, .n_floes = b->n_floes,
+                     .n_others = b->n_bodies - b->n_floes, .time = -1,
                      .towed = b->towed < 0 ? -1 : b->towed - b->n_floes, .branches = b->branches, .line_points = -1,
                      .line_tension = -1};
     f->first = bt_comm_first(c, c->rank, b->n_floes);
@@ -193,8 +213,17 @@ void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_
 /// Quantities of a frame that are written row by row.
 enum quantity { POSE, FORCE, SPEED, VELOCITY, NET, FORCE_4, SPEED_4, VELOCITY_4, NET_4 };
 
+/// ParaView's vectors have three components.
+static void draw_vector(const bt_frames *f, double x, double y, float to[3])
+{
+    double drawn[2];
+    bt_map_axes_vector(&f->axes, x, y, drawn);
+    to[0] = (float)drawn[0], to[1] = (float)drawn[1], to[2] = 0;
+}
+
 /// Bodies from .. from + n of the block to rows first .. first + n.
-static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_frame_row *row, int64_t n, char *buffer)
+static void write_rows(const bt_frames *f, bt_slab *s, enum quantity q, int64_t first, const bt_frame_row *row,
+                       int64_t n, char *buffer)
 {
     bt_rows r = bt_rows_from(s, first, buffer);
     for (int64_t i = 0; i < n; i++) {
@@ -207,8 +236,8 @@ static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_fram
         case NET: memcpy(to, (const float[2]){(float)row[i].fx, (float)row[i].fy}, 2 * sizeof(float)); break;
         case FORCE_4: *(float *)to = (float)row[i].contact_force; break;
         case SPEED_4: *(float *)to = (float)row[i].speed; break;
-        case VELOCITY_4: memcpy(to, (const float[3]){(float)row[i].vx, (float)row[i].vy, 0}, 3 * sizeof(float)); break;
-        case NET_4: memcpy(to, (const float[3]){(float)row[i].fx, (float)row[i].fy, 0}, 3 * sizeof(float)); break;
+        case VELOCITY_4: draw_vector(f, row[i].vx, row[i].vy, to); break;
+        case NET_4: draw_vector(f, row[i].fx, row[i].fy, to); break;
         }
     }
     bt_rows_end(&r);
@@ -229,7 +258,7 @@ static int outline_of(const bt_frames *f, int64_t i, int64_t at, float *v)
     return n;
 }
 
-/// All vertices of bodies from .. from + n of the block in the world frame; `local`: vertices of the block before them.
+/// All vertices of bodies from .. from + n of the block as drawn; `local`: vertices of the block before them.
 static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt_frame_row *row, int64_t from,
                          int64_t n, int64_t local, char *buffer)
 {
@@ -241,8 +270,10 @@ static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt
         local += corners;
         for (int v = 0; v < corners; v++) {
             float *to = bt_rows_next(&r);
-            to[0] = (float)(row[i].x + c * (double)p[2 * v] - sine * (double)p[2 * v + 1]);
-            to[1] = (float)(row[i].y + sine * (double)p[2 * v] + c * (double)p[2 * v + 1]);
+            double drawn[2];
+            bt_map_axes_point(&f->axes, row[i].x + c * (double)p[2 * v] - sine * (double)p[2 * v + 1],
+                              row[i].y + sine * (double)p[2 * v] + c * (double)p[2 * v + 1], drawn);
+            to[0] = (float)drawn[0], to[1] = (float)drawn[1];
         }
     }
     bt_rows_end(&r);
@@ -266,9 +297,9 @@ static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, i
     // Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
     const char *const names[] = {"points", "speed", "velocity", "net_force", "force"},
                       *const units[] = {"m", "m/s", "m/s", "N", "N"},
-                      *const texts[] = {"x, y of every vertex", "speed of the centroid",
-                                        "velocity of the centroid, x, y, 0",
-                                        "sum of all contact forces in the step, x, y, 0",
+                      *const texts[] = {"every vertex, along the axes of /xdmf, from its origin",
+                                        "speed of the centroid", "velocity of the centroid along these axes, and 0",
+                                        "sum of all contact forces in the step along these axes, and 0",
                                         "largest normal contact force in the step"};
     for (int k = 0; k < (force ? 5 : 4); k++) {
         bt_h5_attr_text(f->h, NAMED(names[k]), "units", units[k]);
@@ -282,21 +313,21 @@ static void write_frame(bt_frames *f, paraview *floes, paraview *others, const b
 {
     char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
     const int64_t nf = f->own_floes, nb = f->own_others;
-    write_rows(&f->pose, POSE, f->first, rows, nf, buffer);
-    write_rows(&f->contact_force, FORCE, f->first, rows, nf, buffer);
-    write_rows(&f->speed, SPEED, f->first, rows, nf + nb, buffer);
-    write_rows(&f->velocity, VELOCITY, f->first, rows, nf + nb, buffer);
-    write_rows(&f->net_force, NET, f->first, rows, nf + nb, buffer);
-    write_rows(&f->body_pose, POSE, 0, rows + nf, nb, buffer);
+    write_rows(f, &f->pose, POSE, f->first, rows, nf, buffer);
+    write_rows(f, &f->contact_force, FORCE, f->first, rows, nf, buffer);
+    write_rows(f, &f->speed, SPEED, f->first, rows, nf + nb, buffer);
+    write_rows(f, &f->velocity, VELOCITY, f->first, rows, nf + nb, buffer);
+    write_rows(f, &f->net_force, NET, f->first, rows, nf + nb, buffer);
+    write_rows(f, &f->body_pose, POSE, 0, rows + nf, nb, buffer);
     write_points(f, &floes->points, f->vertices_before, rows, 0, nf, 0, buffer);
-    write_rows(&floes->speed, SPEED_4, f->first, rows, nf, buffer);
-    write_rows(&floes->velocity, VELOCITY_4, f->first, rows, nf, buffer);
-    write_rows(&floes->net_force, NET_4, f->first, rows, nf, buffer);
-    write_rows(&floes->force, FORCE_4, f->first, rows, nf, buffer);
+    write_rows(f, &floes->speed, SPEED_4, f->first, rows, nf, buffer);
+    write_rows(f, &floes->velocity, VELOCITY_4, f->first, rows, nf, buffer);
+    write_rows(f, &floes->net_force, NET_4, f->first, rows, nf, buffer);
+    write_rows(f, &floes->force, FORCE_4, f->first, rows, nf, buffer);
     write_points(f, &others->points, 0, rows, nf, nb, f->floe_vertices - f->vertices_before, buffer);
-    write_rows(&others->speed, SPEED_4, 0, rows + nf, nb, buffer);
-    write_rows(&others->velocity, VELOCITY_4, 0, rows + nf, nb, buffer);
-    write_rows(&others->net_force, NET_4, 0, rows + nf, nb, buffer);
+    write_rows(f, &others->speed, SPEED_4, 0, rows + nf, nb, buffer);
+    write_rows(f, &others->velocity, VELOCITY_4, 0, rows + nf, nb, buffer);
+    write_rows(f, &others->net_force, NET_4, 0, rows + nf, nb, buffer);
     free(buffer);
 }
 

@@ -3,12 +3,14 @@
 #ifndef BT_FRAMES_H
 #define BT_FRAMES_H
 
+#include "output/map_axes.h"
 #include "output/record.h"
 #include "base/h5slab.h"
 
 typedef struct bt_frames {
     bt_h5 *h;
     const bt_comm *comm;
+    bt_map_axes axes;               ///< of what is drawn: /xdmf
     int64_t n_floes, n_others;      ///< of all ranks: floes, other bodies
     int64_t first;                  ///< first body of this rank's block
     int64_t own_floes, own_others;  ///< of the block
@@ -29,7 +31,7 @@ typedef struct bt_frames {
 
 /// Collective. Write /floes and /bodies, make /frames and /xdmf. *f is zeroed memory. What fails shows in h->status of
 /// the rank that met it.
-void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b);
+void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b, const bt_map_axes *axes);
 /// Collective. Add a frame: rows of this rank's block. Returns the same status on all ranks; after a failure the file
 /// stays as the last flush left it.
 bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line);

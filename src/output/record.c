@@ -184,7 +184,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
         bt_h5_describe_file(&r->h5, c->run.title);
         create_series(r);
         create_events(r);
-        bt_frames_create(&r->frames, &r->h5, comm, b);
+        const bt_map_axes axes = bt_map_axes_of(c, b->outlines);
+        bt_frames_create(&r->frames, &r->h5, comm, b, &axes);
         status = bt_comm_agree(comm, r->h5.status); // what the others wrote is in the file: now it may be announced
         if (status == BT_OK) {
             bt_h5_flush(&r->h5);
@@ -302,7 +303,7 @@ char *bt_record_xdmf(const bt_record *r)
     const bt_frames *f = &r->frames;
     return bt_xdmf_text(&(bt_xdmf){.n_floes = f->n_floes, .n_bodies = f->n_others, .floe_vertices = f->floe_vertices,
                                    .body_vertices = f->other_vertices, .towed = f->towed, .branches = f->branches,
-                                   .time = f->times, .line = f->lines, .n_frames = f->n});
+                                   .axes = f->axes, .time = f->times, .line = f->lines, .n_frames = f->n});
 }
 
 /// What is still on its way goes to the file, and the numbers of the whole run are made: on rank 0.

@@ -131,6 +131,7 @@ typedef struct bt_record_bodies {
     int branches;                ///< of the tow line, 0 = none
     /// where this rank holds them all, while the record is open: frames draw their outlines; NULL = those of a copy
     const bt_bodies *all;
+    const bt_outline_counts *outlines; ///< of the map that the floes came from; NULL: of none
 } bt_record_bodies;
 
 /// A body in a frame.
@@ -238,7 +239,7 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 /// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
 /// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies],
 /// /frames/velocity and /frames/net_force [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2],
-/// /frames/line_tension [T][k]; and for ParaView in single precision with all vertices in the world frame (/xdmf, see
+/// /frames/line_tension [T][k]; and for ParaView in single precision with all vertices as drawn (/xdmf, see
 /// src/output/xdmf.c).
 /// line: the same on all ranks, read where there are branches. The status is the same on all ranks.
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,

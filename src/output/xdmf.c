@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The frames for ParaView: an XML description of what is in result.h5.
 //
-// ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame in the world frame, in single
-// precision; the polygons never change, and their connectivity is stored once:
+// ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame as they are drawn, in single
+// precision (map_axes.h); the polygons never change, and their connectivity is stored once:
 //     /xdmf/floes, /xdmf/bodies     mixed topology
 //     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
 //     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN
@@ -126,8 +126,11 @@ static void line(FILE *f, const bt_xdmf *x, int64_t frame)
     for (int i = 0; i < 2 * k; i++) fprintf(f, "%s%d", i ? " " : "", i);
     fputs("</DataItem>\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
     begin_xml(f, 2 * (int64_t)k, 2, "Float", 8);
-    for (int i = 0; i < 2 * k; i++)
-        fprintf(f, "%s%.9g %.9g", i ? " " : "", l->point[i / 2][i % 2][0], l->point[i / 2][i % 2][1]);
+    for (int i = 0; i < 2 * k; i++) {
+        double drawn[2];
+        bt_map_axes_point(&x->axes, l->point[i / 2][i % 2][0], l->point[i / 2][i % 2][1], drawn);
+        fprintf(f, "%s%.9g %.9g", i ? " " : "", drawn[0], drawn[1]);
+    }
     fputs("</DataItem>\n          </Geometry>\n", f);
     begin_attribute(f, "tension", "Scalar");
     begin_xml(f, k, 1, "Float", 8);
@@ -137,12 +140,27 @@ static void line(FILE *f, const bt_xdmf *x, int64_t frame)
     fputs("        </Grid>\n", f);
 }
 
+/// What the coordinates are, for a reader of the file: ParaView passes over it.
+static void information(FILE *f, const bt_map_axes *a)
+{
+    fprintf(f,
+            "      <Information Name=\"axes\" Value=\"%s\"/>\n"
+            "      <Information Name=\"origin\" Value=\"x = %.17g m, y = %.17g m\"/>\n",
+            bt_map_axes_names(a), a->origin[0], a->origin[1]);
+    if (*a->crs)
+        fprintf(f,
+                "      <Information Name=\"crs\" Value=\"%s\"/>\n"
+                "      <Information Name=\"origin in crs\" Value=\"%.17g m, %.17g m\"/>\n",
+                a->crs, a->crs_place[0], a->crs_place[1]);
+}
+
 char *bt_xdmf_text(const bt_xdmf *x)
 {
     bt_text text;
     bt_text_begin(&text);
     FILE *f = text.out;
     fputs(BT_XDMF_HEAD, f);
+    information(f, &x->axes);
     for (int64_t i = 0; i < x->n_frames; i++) {
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
                    "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);

@@ -3,6 +3,7 @@
 #ifndef BT_XDMF_H
 #define BT_XDMF_H
 
+#include "output/map_axes.h"
 #include "output/record.h"
 
 /// Sizes of what result.h5 holds.
@@ -11,6 +12,7 @@ typedef struct bt_xdmf {
     int64_t floe_vertices, body_vertices;      ///< points
     int64_t towed;                             ///< which of the other bodies, −1 = none
     int branches;                              ///< of the tow line
+    bt_map_axes axes;
     const double *time;                        ///< [n_frames] s
     const bt_frame_line *line;                 ///< [n_frames], where there are branches
     int64_t n_frames;

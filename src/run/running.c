@@ -61,6 +61,7 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     bt_record_bodies b;
     bt_status status = bt_gather_bodies(r->comm, r->w, &r->roster, &b, err);
     if (status != BT_OK) return status;
+    b.outlines = &r->totals.outlines;
     // steps that are made again leave the result that they belong to
     const bool again = kept || r->until >= 0;
     status =

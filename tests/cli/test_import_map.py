@@ -8,12 +8,14 @@ import json
 import subprocess
 import sys
 
+import h5py
+import netCDF4
 import numpy as np
 import pytest
 import yaml
 from osgeo import gdal, ogr, osr
 from pyproj import Geod
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 import tutorial
@@ -24,6 +26,7 @@ from test_outlines import field, same_ring
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import map_read  # noqa: E402
+import map_stairs  # noqa: E402
 import outlines as command_line  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
@@ -355,6 +358,92 @@ def test_label_images(tmp_path):
     assert record["floes"]["with_thickness"] == 3 and record["map"]["crs"] == "local metres"
 
 
+def on_pixels(polygon, shape):
+    """Which pixels have their middle in a convex polygon."""
+    y, x = np.indices(shape) + 0.5
+    ring = np.asarray(polygon.exterior.coords)
+    side = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for a, b in zip(ring, ring[1:])]
+    return (np.array(side) > 0).all(axis=0)
+
+
+def convex_polygons(rng, n, middle, radius):
+    for _ in range(n):
+        points = middle + rng.uniform(0.3, 1) * radius * regular(0, 0, 1, 9)[rng.permutation(9)[:6]] * [
+            1, rng.uniform(.4, 1)]
+        a = rng.uniform(0, 7)
+        turned = (points - middle) @ [[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] + middle + rng.uniform(0, 1, 2)
+        yield Polygon(turned).convex_hull.buffer(0)
+
+
+def test_staircases_of_convex_shapes_become_convex():
+    """As few bays as the pixels allow: none. Every unit step lies within half a pixel of the shore, and so does the
+    polygon that was drawn. Red: Douglas & Peucker, with which 139 of 144 were not convex."""
+    rng = np.random.default_rng(3)
+    for drawn in convex_polygons(rng, 40, 45, 40):
+        drawn = drawn if drawn.exterior.is_ccw else Polygon(list(drawn.exterior.coords)[::-1])
+        labels = on_pixels(drawn, (92, 92)).astype(np.int32)
+        region = max((p for p, _ in map_read.regions(labels, labels > 0)), key=lambda p: p.area)
+        shore = map_stairs.straight(region)
+        assert shore.convex_hull.area < shore.area * (1 + 1e-9)
+        assert shore.area == pytest.approx(region.area, rel=5e-3)
+        steps = map_stairs.unit_steps(np.asarray(region.exterior.coords))
+        inner, outer = map_stairs.gates(*steps, 0.5)
+        corners, at = map_stairs.tight(inner, outer)
+        within = map_stairs.filled(corners, map_stairs.edge_room(corners, at, inner, outer), region.area, 1.0)
+        # before and after it takes the rest of the area
+        for ring, most in ((within, 0.5 + 1e-9), (shore.exterior.coords, 0.75)):
+            assert max(Polygon(ring).exterior.distance(Point(m)) for m in steps[0]) < most
+        assert shore.symmetric_difference(drawn).area < 0.45 * drawn.length
+
+
+def test_bays_that_pixels_prove_stay():
+    labels = discs(np.zeros((80, 80), np.int32), (40, 40, 30, 1), (40, 66, 12, 0))
+    (region, _), = map_read.regions(labels, labels > 0)
+    shore = map_stairs.straight(region)
+    bay = shore.convex_hull.difference(shore)
+    assert shore.area == pytest.approx(region.area, rel=1e-3) and bay.area > 150 and bay.geom_type == "Polygon"
+    square, = (p for p, _ in map_read.regions(np.ones((7, 9), np.int32), np.ones((7, 9), bool)))
+    assert map_stairs.straight(square).symmetric_difference(square).area < 0.02 * square.area
+
+
+@pytest.mark.parametrize("pixel", [(1.0, 1.0), (0.0133, 0.0133), (3.0, 2.0)])
+@pytest.mark.parametrize("middles", [False, True])
+def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles):
+    """Along the edges of pixels, as GDAL polygonizes, or from middle to middle, as contours of images run, rounded:
+    convex, each with its area and the names of those that an image's edge cut. Red: 517 floes of a public map in 5,760
+    convex parts, by this 613."""
+    rng = np.random.default_rng(8)
+    rings = []
+    for k, drawn in enumerate(convex_polygons(rng, 12, 30, 27)):
+        drawn = drawn if drawn.exterior.is_ccw else Polygon(list(drawn.exterior.coords)[::-1])
+        labels = on_pixels(drawn, (64, 64)).astype(np.int32)
+        region = max((p for p, _ in map_read.regions(labels, labels > 0)), key=lambda p: p.area)
+        ring = np.asarray(region.exterior.coords)[:-1]
+        if middles:
+            inner, _ = map_stairs.gates(*map_stairs.unit_steps(np.asarray(region.exterior.coords)), 0.5)
+            ring = inner[np.r_[True, np.abs(np.diff(inner, axis=0)).sum(axis=1) > 0]]
+            ring = ring if np.abs(ring[0] - ring[-1]).sum() else ring[:-1]
+        rings.append(np.round((ring + (70 * (k % 4), 70 * (k // 4))) * pixel, 5))
+    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    got, record = outlines(map_, "--heading", 90)
+    assert counted(record)["stairs"] == 12 and record["floes"]["convex"] >= 11
+    assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-4)
+    for a, b in zip(got, rings):
+        assert plane_area(a) == pytest.approx(plane_area(b), rel=1e-3)
+    kept, record = outlines(map_, "--heading", 90, "--stairs", "keep")
+    assert "stairs" not in counted(record) and record["floes"]["convex"] == 0
+    assert sum(map(len, kept)) > 2 * sum(map(len, got))
+
+
+def test_outlines_drawn_by_hand_are_no_staircases(tmp_path):
+    """Boxes on a grid, polygons of any kind: as they are."""
+    boxes = [np.array([[0, 0], [20, 0], [20, 30], [10, 30], [10, 20], [0, 20]]) + (50 * k, 10 * k) for k in range(6)]
+    for rings in (boxes, RINGS):
+        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.LOCAL), "--centre", "0,0")
+        assert "stairs" not in counted(record)
+        assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-9)
+
+
 def test_middles_of_steps_keep_the_area():
     """Of a region of pixels all but half of one, however long its shore is, and another half for each pond."""
     labels = discs(np.zeros((90, 90), np.int32), (45, 45, 40, 1), (45, 45, 12, 0), (20, 45, 5, 0))
@@ -393,7 +482,7 @@ def test_small_floes_count_by_their_pixels(tmp_path):
     np.save(tmp_path / "map.npy", labels)
     rings, record = outlines(tmp_path / "map.npy", "--pixel", "1")
     assert sorted(plane_area(r) for r in rings) == pytest.approx([4, 6, 6], rel=2e-6)
-    assert record["changes"]["small"]["count"] == 2 and record["changes"]["small"]["area_before_m2"] == 6
+    assert record["changes"]["small"]["count"] == 2 and record["changes"]["small"]["area_before_m2"] == pytest.approx(6)
 
 
 def test_nodata_that_is_water(tmp_path):
@@ -458,6 +547,217 @@ def test_a_thickness_by_another_name(tmp_path, capsys, name, read):
     said = capsys.readouterr().out
     assert record["floes"]["with_thickness"] == (len(root["features"]) if read else 0)
     assert (f"not read as the thickness: {name}" in said) == ("thickness: no floe has one" in said) == (not read)
+
+
+# ---- maps as the world has them
+
+
+def coded(record):
+    return {w["code"]: w for w in record["warnings"]}
+
+
+def geopackage(path, rings, srs_id):
+    """One whose system is undefined, as programs write it that do not know theirs."""
+    file = gdal.GetDriverByName("GPKG").Create(str(path), 0, 0, 0, gdal.GDT_Unknown)
+    layer = file.CreateLayer("floes", None, ogr.wkbPolygon)
+    for ring in rings:
+        feature = ogr.Feature(layer.GetLayerDefn())
+        feature.SetGeometry(ogr.CreateGeometryFromWkb(Polygon(ring).wkb))
+        layer.CreateFeature(feature)
+    for table in "gpkg_contents", "gpkg_geometry_columns":
+        file.ExecuteSQL(f"UPDATE {table} SET srs_id = {srs_id}")
+    return path
+
+
+UNSAID = {
+    "GeoJSON": lambda p, rings: write(p / "map.geojson", rings),
+    "GeoJSON of a program that names the default": lambda p, rings: write(
+        p / "map.geojson", rings, "urn:ogc:def:crs:OGC:1.3:CRS84"),
+    "GeoJSON in EPSG:4326": lambda p, rings: write(p / "map.geojson", rings, "EPSG:4326"),
+    "lines of GeoJSON": lambda p, rings: text(p / "map.geojsonl", "".join(json.dumps({
+        "type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
+            [*r.tolist(), r[0].tolist()]]}}) + "\n" for r in rings)),
+    "GeoPackage, undefined geographic": lambda p, rings: geopackage(p / "map.gpkg", rings, 0),
+    "GeoPackage, undefined Cartesian": lambda p, rings: geopackage(p / "map.gpkg", rings, -1),
+}
+
+
+@pytest.mark.parametrize("kind", UNSAID)
+@pytest.mark.parametrize("crs", ["EPSG:32633", "local"])
+def test_the_system_is_said_where_the_file_does_not(tmp_path, capsys, kind, crs):
+    """Red: "is in EPSG:4326", which no file of these says of itself, "and --crs says ...": no way on."""
+    rings = [r + (500e3, 8.9e6) for r in RINGS]
+    map_ = UNSAID[kind](tmp_path, rings)
+    said = outlines(map_, code=IO, name="no.geojson")
+    assert "--crs" in said
+    capsys.readouterr()
+    got, record = outlines(map_, "--crs", crs, "--heading", 90)
+    assert record["map"]["crs"].startswith("local" if crs == "local" else crs)
+    assert "crs: as --crs says; the file" in capsys.readouterr().out
+    assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=0 if crs == "local" else 2e-3,
+                                                      abs=1e-3)
+
+
+def test_what_contradicts_crs_is_refused_all_the_same(tmp_path):
+    degrees = write(tmp_path / "map.geojson", [places(r) for r in RINGS])
+    assert "as degrees do" in outlines(degrees, "--crs", "EPSG:32633", code=IO, name="no.geojson")
+    assert "degrees look in metres" in outlines(degrees, "--crs", "local", code=IO, name="no.geojson")
+    shape = tmp_path / "map.gpkg"
+    ogr2ogr("-f", "GPKG", shape, degrees)
+    assert "and --crs says" in outlines(shape, "--crs", "EPSG:3413", code=IO, name="no.geojson")
+
+
+def test_a_field_in_metres_comes_back_through_another_program(tmp_path):
+    """Of the name of local metres GDAL makes EPSG:4326, and programs on it write that."""
+    case = changed(FRAMES["basin"], ice={"concentration": 0.3, "size": 20, "thickness": 0.5})
+    rings, *_ = field(tmp_path, case)
+    field(tmp_path, case, name="field.geojson")
+    ogr2ogr("-f", "GeoJSON", "-lco", "RFC7946=NO", tmp_path / "through.geojson", tmp_path / "field.geojson")
+    assert "CRS84" in json.loads((tmp_path / "through.geojson").read_text())["crs"]["properties"]["name"]
+    back, _ = outlines(tmp_path / "through.geojson", "--crs", "local", "--centre", "0,0", "--heading", 90)
+    assert sum(map(plane_area, back)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-3)
+
+
+GRID = discs(np.zeros((60, 80), np.int16), (15, 12, 9, 1), (40, 60, 14, 2))  # small in the north-west
+
+
+def hdf5(path, **grids):
+    with h5py.File(path, "w") as f:
+        for name, values in grids.items():
+            f[name.replace("__", "/")] = values
+    return path
+
+
+def netcdf(path, step, at=None, **grids):
+    """With coordinates x and y, from the first row on by `step`; None: without any."""
+    with netCDF4.Dataset(path, "w") as f:
+        for name, n in ("y", 60), ("x", 80):
+            f.createDimension(name, n)
+            if step is not None:
+                f.createVariable(name, "f8", (name,))[:] = np.arange(n) * (step if name == "y" else abs(step))
+        for name, values in grids.items():
+            f.createVariable(name, values.dtype, ("y", "x"))[:] = values
+    return path
+
+
+def lie_as_in_the_image(rings):
+    small, large = sorted(rings, key=plane_area)
+    (x, y), (x2, y2) = small.mean(axis=0), large.mean(axis=0)
+    return x < x2 - 60 and y > y2 + 20
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda p: hdf5(p / "map.h5", labels=GRID), ("--pixel", "2")),
+    (lambda p: hdf5(p / "map.h5", seg__labels=GRID, odds=GRID / 3), ("--pixel", "2", "--layer", "seg/labels")),
+    (lambda p: netcdf(p / "map.nc", None, labels=GRID), ("--pixel", "2")),
+    (lambda p: netcdf(p / "map.nc", None, labels=GRID, odds=GRID / 3), ("--pixel", "2", "--layer", "labels")),
+    (lambda p: netcdf(p / "map.nc", -2.0, labels=GRID), ("--crs", "local")),
+    (lambda p: netcdf(p / "map.nc", 2.0, labels=GRID[::-1], odds=GRID / 3), ("--crs", "local", "--layer", "labels"))])
+def test_grids_are_chosen_by_name_and_not_mirrored(tmp_path, make, words):
+    """Red: "has 0 bands, as pictures do"; and GDAL's netCDF driver reads rows without a place from the south."""
+    map_ = make(tmp_path)
+    if "--layer" in words:
+        assert "holds the grids" in (said := outlines(map_, code=IO, name="no.geojson"))
+        assert words[-1] + " [60x80]" in said and "odds" in said and "--layer" in said
+        assert "holds the grids" in outlines(map_, "--layer", "none", code=IO, name="no.geojson")
+    rings, record = outlines(map_, *words, "--heading", 90)
+    assert len(rings) == 2 and lie_as_in_the_image(rings) and record["warnings"] == []
+    assert sum(map(plane_area, rings)) == pytest.approx(4 * np.count_nonzero(GRID), rel=1e-3)
+
+
+def test_an_ice_chart_is_not_a_map_of_floes(tmp_path):
+    """Red: regions of 50 km ran as three floes of 100 %, the island in one of them as ice, and nothing was said."""
+    def ring(r):
+        return places(r).tolist() + places(r[:1]).tolist()
+    region = {"type": "Polygon", "coordinates": [ring(regular(0, 0, 9e3)), ring(regular(0, 0, 2e3))]}
+    map_ = write(tmp_path / "chart.geojson", [region, places(regular(30e3, 0, 8e3))])
+    root = json.loads(map_.read_text())
+    for feature in root["features"]:
+        feature["properties"] = {"POLY_TYPE": "I", "ct": "91"}
+    map_.write_text(json.dumps(root))
+    _, record = outlines(map_, "--where", "POLY_TYPE = 'I'")
+    warning = coded(record)["ice_chart"]
+    assert "100 %" in warning["text"] and len(warning["text"]) <= 160
+    assert warning["values"]["holes_m2"] == pytest.approx(plane_area(regular(0, 0, 2e3)), rel=1e-3)
+    assert warning["values"]["columns"] == ["POLY_TYPE", "ct"]
+
+
+def labelled(path, labels):
+    np.save(path, labels)
+    return path
+
+
+def test_negative_labels(tmp_path):
+    """-1 is what is in no group. Red: one floe of the whole image, the others "lie in another, left out"."""
+    labels = GRID.astype(np.int16) - 1
+    map_ = labelled(tmp_path / "map.npy", labels)
+    said = outlines(map_, "--pixel", "2", "--water", "0", code=IO, name="no.geojson")
+    assert "label -1" in said and "--water 0,-1" in said
+    for water in ("-1", "-1,7"):
+        rings, _ = outlines(map_, "--pixel", "2", "--water", water)
+        assert len(rings) == 2
+
+
+@pytest.mark.parametrize("kind, first", [(np.uint32, 2 ** 31 + 5), (np.int64, 2 ** 40), (np.uint64, 2 ** 63 + 1),
+                                         (np.float64, 2.0 ** 50)])
+def test_labels_of_any_size(tmp_path, kind, first):
+    """Red: "has values that are no labels (whole numbers)", which they are."""
+    labels = np.where(GRID > 0, GRID.astype(kind) + kind(first), kind(0))
+    map_ = labelled(tmp_path / "map.npy", labels)
+    rings, record = outlines(map_, "--pixel", "2", "--thickness", f"{int(kind(first) + kind(1))}=0.5")
+    assert len(rings) == 2 and record["floes"]["with_thickness"] == 1
+    assert outlines(labelled(tmp_path / "map.npy", GRID), "--pixel", "2")[1]["floes"]["area_m2"] == record["floes"][
+        "area_m2"]
+    source = json.loads((tmp_path / "out.geojson").read_text())["features"][0]["properties"]["source"]
+    assert str(GRID.max()) in source or str(GRID[GRID > 0].min()) in source
+    assert "no labels" in outlines(labelled(tmp_path / "half.npy", GRID / 2.0), "--pixel", "2", code=IO,
+                                   name="no.geojson")
+
+
+def test_what_of_an_image_was_seen(tmp_path):
+    """A trapezium in a black rectangle: the concentration is of what was imaged. By a label of its own, by corners, and
+    by nodata. Red: 0.25 for 0.40."""
+    rows, columns = np.indices((100, 120))
+    seen = np.abs(columns + 0.5 - 60) < 20 + 0.4 * (rows + 0.5)
+    labels = discs(np.zeros((100, 120), np.uint8), (20, 60, 12, 1), (60, 40, 14, 2), (70, 80, 18, 3))
+    share = np.count_nonzero(labels) / np.count_nonzero(seen)
+    black = np.where(seen, labels, 9)
+    for map_, words in ((labelled(tmp_path / "a.npy", black), ("--unseen", "9")),
+                        (labelled(tmp_path / "a.npy", black), ("--unseen", "9,-3")),
+                        (labelled(tmp_path / "b.npy", labels), ("--footprint", "40,0,80,0,120,100,0,100"))):
+        _, record = outlines(map_, "--pixel", "2", *words)
+        # of the rectangle around the floes, as ever
+        x0, x1, y0, y1 = (v / 2 for v in record["floes"]["rectangle_m"])
+        middle = np.array(record["plane"]["centre"]) / 2
+        x, y = columns + 0.5 - 60 - middle[0], 50 - rows - 0.5 - middle[1]
+        part = seen & (x > x0) & (x < x1) & (y > y0) & (y < y1)
+        assert record["floes"]["concentration"] == pytest.approx(np.count_nonzero(labels) / np.count_nonzero(part),
+                                                                 rel=0.025)
+        assert record["floes"]["imaged_share"] == pytest.approx(np.count_nonzero(part) / (x1 - x0) / (y1 - y0),
+                                                                rel=0.02)
+    assert share < 0.5
+    tif = image(tmp_path / "c.tif", black, nodata=9)
+    assert outlines(tif, "--crs", "local", "--unseen", "9")[1]["floes"]["floes"] == 3
+    assert "no pixel that was seen" in outlines(tmp_path / "b.npy", "--pixel", "2", "--unseen", "0,1,2,3", code=IO,
+                                                name="no.geojson")
+
+
+def test_floes_that_have_grown_together(tmp_path):
+    """Red: nothing is said where a mask has bridges between floes, or where a label of water is taken for ice."""
+    mask = (GRID > 0).astype(np.uint8)
+    apart, record = outlines(labelled(tmp_path / "map.npy", mask), "--pixel", "2")
+    assert record["warnings"] == []
+    mask[15:18, 15:55] = mask[15:35, 54:57] = 1
+    _, record = outlines(labelled(tmp_path / "map.npy", mask), "--pixel", "2")
+    assert coded(record)["necks"]["values"]["floes"] == 1
+    background, record = outlines(labelled(tmp_path / "map.npy", GRID + 1), "--pixel", "2")
+    assert len(background) == 1 and coded(record)["merged_floes"]["values"]["share"] == 1
+    # a large floe, or one alone, is none of it
+    alone = discs(np.zeros((60, 80), np.uint8), (30, 40, 20, 1))
+    assert outlines(labelled(tmp_path / "map.npy", alone), "--pixel", "2")[1]["warnings"] == []
+    beside = discs(alone, (8, 8, 5, 2), (50, 70, 6, 3))
+    _, record = outlines(labelled(tmp_path / "map.npy", beside), "--pixel", "2")
+    assert set(coded(record)) == {"merged_floes"} and len(coded(record)["merged_floes"]["text"]) <= 160
 
 
 # ---- repairs
@@ -567,6 +867,7 @@ BAD = {
     "column": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--thickness", "hi"), "no column hi"),
     "where": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--where", "none = 2"), "--where"),
     "not finite": (lambda p: not_finite(p / "map.gpkg"), ("--crs", "local"), "no finite number"),
+    "a grid by GDAL's name": (lambda p: p / "NETCDF:map.nc:labels", (), "no such file"),
     "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "no labels"),
     "only water": (lambda p: array(p / "map.npy", np.zeros((3, 3))), ("--pixel", "1"), "no label of ice"),
     "cube": (lambda p: array(p / "map.npy", np.ones((3, 3, 3))), ("--pixel", "1"), "one label a pixel"),
@@ -608,7 +909,8 @@ def test_bad_maps(tmp_path, name):
 
 @pytest.mark.parametrize("words, says", [
     (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "no length"),
-    (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--record", "a.txt"), ".json"),
+    (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
+    (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
     (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])
 def test_usage(tmp_path, words, says, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -178,6 +178,80 @@ def test_forces_of_a_frame_balance(tmp_path):
     np.testing.assert_array_less(np.abs(force.sum(axis=1)).max(axis=1), 1e-5 * scale + 1e-9)
 
 
+def signed_area(ring):
+    x, y = (ring - ring[0]).T
+    return 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+
+
+FAR = {"run": {"dt": 0.1, "duration": 1}, "domain": {"frame": "basin", "x0": 500e3, "y0": 8676e3, "length": 20,
+       "width": 10}, "ice": {"concentration": 0.5, "size": 0.4, "thickness": 0.04, "shape": "rectangles"},
+       "body": {"shape": "none"}, "tow": {"mode": "none"}, "water": {"current_x": 0.2, "current_y": 0.1}}
+NORTH = changed(FAR, domain={"frame": "geographic", "x0": -100, "y0": -100, "length": 200, "width": 200,
+                             "ends": "open", "sides": "open"}, ice={"outlines": "map.geojson", "thickness": 1,
+                                                                    "nonconvex": "split"})
+SEVEN = np.array([[0, 0], [0, -10], [50, -10], [50, -40], [60, -40], [60, 0]]) / 4  # east, north: like the digit
+
+
+@pytest.mark.parametrize("case, crs, place", [
+    (FAR, None, None), (changed(FAR, domain__frame="geographic"), None, None),
+    (NORTH, "EPSG:32633", (560e3, 8490e3)), (NORTH, "EPSG:4326", (17.25, 76.5)),
+    (NORTH, "urn:x-bergtow:crs:local-metres-east-north", (0, 0)),
+    (changed(NORTH, domain={**NORTH["domain"], "x0": 4900, "y0": -2100}), "EPSG:32633", (560e3 + 2e3, 8490e3 - 5e3))])
+def test_the_frames_lie_as_on_the_map(tmp_path, case, crs, place):
+    """East to the right and north up, near the origin that is named, and with it in the crs of the map. Red: x and y as
+    they are, in single precision: a floe of 0.4 m at a northing of 8,676 km has no area, or four times its own."""
+    if crs:
+        scale = (2 / 111e3 / np.cos(np.radians(76.5)), 2 / 111e3) if crs == "EPSG:4326" else (1, 1)
+        ring = [list(p) for p in SEVEN * scale + place]
+        origin = {} if case["domain"]["x0"] != 4900 else {"ice__origin_east": 560e3, "ice__origin_north": 8490e3}
+        if origin:
+            ring = [[x - 4e3, y + 10e3] for x, y in ring]
+        case = changed(case, **origin)
+        (tmp_path / "map.geojson").write_text(json.dumps({
+            "type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": crs}}, "features": [
+                {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring + ring[:1]]}}
+            ]}))
+    write_case(tmp_path, case)
+    done = subprocess.run([BERGTOW, "run", "case.yml", "-o", "out", "--quiet", "--threads", "1"], cwd=tmp_path,
+                          env=environment(), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    folder, geographic = tmp_path / "out", case["domain"]["frame"] == "geographic"
+    with h5py.File(folder / "result.h5") as f:
+        about = dict(f["xdmf"].attrs)
+        area, offsets, outline = (f[f"floes/{n}"][()] for n in ("area", "offsets", "vertices"))
+        poses, velocity = f["frames/pose"][()], f["frames/velocity"][()]
+    origin = np.array([about["origin_x"], about["origin_y"]])
+    middle = [case["domain"][k] + case["domain"][n] / 2 for k, n in (("x0", "length"), ("y0", "width"))]
+    assert np.abs(origin - middle).max() < 10 * max(case["domain"]["length"], case["domain"]["width"])
+    root = ElementTree.parse(folder / "frames.xdmf").getroot().find("Domain/Grid")
+    said = {i.get("Name"): i.get("Value") for i in root.findall("Information")}
+    assert said["axes"] == about["axes"] == ("east (y), north (x)" if geographic else "x, y")
+    assert said["origin"] == f"x = {origin[0]:.17g} m, y = {origin[1]:.17g} m"
+    steps = root.findall("Grid")
+    for step, pose, moving in zip(steps, poses, velocity, strict=True):
+        block = next(g for g in step.findall("Grid") if g.get("Name") == "floes")
+        drawn = polygons(block.find("Topology"), load(block.find("Geometry/DataItem"), folder), folder)
+        np.testing.assert_allclose([signed_area(p.astype(float)) for p in drawn], area, rtol=1e-4)  # and anticlockwise
+        world = list(placed({"vertices": outline, "offsets": offsets}, pose))
+        for a, b in zip(drawn, world, strict=True):
+            seen = (b - origin)[::-1, ::-1] if geographic else b - origin
+            np.testing.assert_allclose(a, seen, atol=1e-4 * np.sqrt(area.min()))
+        arrows = {a.get("Name"): a for a in block.findall("Attribute")}["velocity"]
+        shown = load(arrows.find("DataItem"), folder)[:, :2]
+        np.testing.assert_array_equal(shown[:, ::-1] if geographic else shown, moving[:len(shown)])
+    if crs in (None, "urn:x-bergtow:crs:local-metres-east-north"):
+        assert "crs" not in about and "crs" not in said
+        return
+    assert said["crs"] == about["crs"] and (about["crs"] == crs or crs == "EPSG:4326")
+    pyproj = pytest.importorskip("pyproj")
+    first = np.array(polygons((b := steps[0].findall("Grid")[0]).find("Topology"), load(
+        b.find("Geometry/DataItem"), folder), folder)[0], float) + (about["origin_east"], about["origin_north"])
+    to_map = pyproj.Transformer.from_crs(about["crs"], crs, always_xy=True)
+    places = np.array(to_map.transform(*first.T)).T
+    near = 1e-7 if crs == "EPSG:4326" else 1e-3
+    assert all(np.abs(places - p).max(axis=1).min() < near for p in ring)
+
+
 TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000,
                     tow__speed=0.6, body__x=4, tow__line={"branches": 2}, output__frame_interval=0.5)
 
