@@ -186,15 +186,14 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     def put(name: str, dims: tuple[str, ...], dataset: h5py.Dataset, column: int | None = None,
             part: slice | None = None, units: str | None = None, long_name: str | None = None) -> None:
         a = dict(dataset.attrs)
-        attributes = {"units": units or _text(a.get("units", "1")),
-                      "long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
+        attributes = {"long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
         if "label" in a:
             attributes["label"] = _text(a["label"])
         assert name not in variables, name
         texts = dataset.dtype.kind == "O"
         values = [_text(v) for v in dataset[()]] if texts else stored(dataset, column, part)
-        if texts:
-            del attributes["units"]
+        if not texts and (units or "units" in a):
+            attributes["units"] = units or _text(a["units"])
         variables[name] = xarray.Variable(dims, values, attributes)
 
     for group, prefix in _GROUPS.items():

@@ -74,8 +74,8 @@ def other(m, *names):
 
 
 DAMAGES = {
-    "seal": lambda m: flip(m / "result.h5", 30),
-    "first bytes": lambda m: flip(m / "result.h5", 600),
+    "seal": lambda m: flip(m / "result.h5", -100),
+    "first bytes": lambda m: flip(m / "result.h5", 30),
     "last byte": lambda m: flip(m / "result.h5", -1),
     "result cut": lambda m: os.truncate(m / "result.h5", 5000),
     "result empty": lambda m: os.truncate(m / "result.h5", 0),
@@ -284,4 +284,4 @@ def test_ensemble_file_is_made_anew_whatever_it_was(quiet, copy):
     flip(copy / "all/ensemble.h5", -1)
     assert ensemble(copy).returncode == DONE
     assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == [] and (
-        copy / "all/ensemble.h5").read_bytes().startswith(b"bergtow sealed file\nkind: ensemble 1\n")
+        copy / "all/ensemble.h5").read_bytes()[-128:].startswith(b"bergtow sealed file\nkind: ensemble ")

@@ -151,14 +151,15 @@ FOREIGN = ["failure.h5", "frames.xdmf", "case.resolved.yml", "stop", "summary.js
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]])
-@pytest.mark.parametrize("name", FOREIGN)
-def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, force):
+@pytest.mark.parametrize("name, dear", [(name, b"dear to somebody") for name in FOREIGN] +
+                         [(name, b"\x89HDF\r\n\x1a\ndear to somebody") for name in FOREIGN if name.endswith("h5")])
+def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, dear, force):
     out = tmp_path / "out"
     out.mkdir()
-    (out / name).write_text("dear to somebody")
+    (out / name).write_bytes(dear)
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
     assert result.returncode == IO and f"{out / name}: is no file that this program has written" in result.stderr
-    assert contents(out) == {(out / name).relative_to(out): b"dear to somebody"}
+    assert contents(out) == {(out / name).relative_to(out): dear}
 
 
 @pytest.mark.parametrize("damage", [b"", b"\0" * 4096])
