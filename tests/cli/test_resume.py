@@ -248,7 +248,8 @@ def opened_to_change_it(path):
 
 
 def of_an_earlier_format(path):
-    path.write_bytes(b"bergtow sealed file\nkind: checkpoint 2\nbytes: 9\n".ljust(512, b"\0") + path.read_bytes()[:-128])
+    seal = b"bergtow sealed file\nkind: checkpoint 2\nbytes: 9\n"
+    path.write_bytes(seal.ljust(512, b"\0") + path.read_bytes()[:-128])
 
 
 ENDS = {
