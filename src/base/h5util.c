@@ -48,6 +48,7 @@ static void begin(bt_h5 *h, const char *path, bt_errors *err)
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
 {
     begin(h, path, err);
+    if ((h->status = bt_file_may_take(path, err)) != BT_OK) return bt_h5_close(h);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     bool set = bt_h5driver_select(access, h->errnum) >= 0;

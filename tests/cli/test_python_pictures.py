@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -58,6 +59,9 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
     picture = bergtow.plot_force(tmp_path / "out", max=50)
     shutil.rmtree(tmp_path / "out")
     assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(bergtow.BergtowError, match="pipe.png: is no regular file"):
+        picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
 
