@@ -47,6 +47,13 @@ class Result:
     def __repr__(self) -> str:
         return f"<bergtow.Result {self.folder}>"
 
+    def __str__(self) -> str:
+        """What print() shows: the numbers that a notebook shows, one a line."""
+        if not (self.folder / "summary.json").exists():
+            return f"{self.folder}: has no summary: the run has not ended"
+        return "\n".join([f"{self.folder}", *(f"  {name}: {html.unescape(text)}" for name, text in
+                                             _shown(self.summary))])
+
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in _shown(self.summary))
         return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
@@ -59,6 +66,7 @@ _SHOWN = ("title", "n_floes", "concentration", "sim_time_s", "mean_ice_resistanc
 
 def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """(name, text) of what a notebook shows; ± is one standard error, as in the report."""
+    yield "verdict", html.escape(str(summary.get("window", {}).get("verdict")))
     for name in _SHOWN:
         value = summary.get(name)
         if value is None:

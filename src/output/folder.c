@@ -236,17 +236,15 @@ void bt_folder_settle(const char *dir)
     bt_errors_free(&unheard);
 }
 
-bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err)
+bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err)
 {
     const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun)
-        bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+        bt_errors_add(err, "%s: holds a result; %s", dir, remedy);
     else
         bt_errors_add(err,
-                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, "
-                      "or --force to replace it",
-                      dir, dir);
+                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, %s", dir, dir, remedy);
     return BT_ERR_IO;
 }
