@@ -226,7 +226,8 @@ def link_to_a_device(path):
     path.symlink_to("/dev/null")
 
 
-WRITTEN = {"field.h5": ["field", "case.yml", "-o", "field.h5"], "field.h5.part": ["field", "case.yml", "-o", "field.h5"],
+WRITTEN = {"field.h5": ["field", "case.yml", "-o", "field.h5"],
+           "field.h5.part": ["field", "case.yml", "-o", "field.h5"],
            "field.geojson": ["field", "case.yml", "-o", "field.geojson"],
            "field.geojson.tmp": ["field", "case.yml", "-o", "field.geojson"],
            "c.h5": ["run", "case.yml", "--dump-contacts", "20:c.h5"],
