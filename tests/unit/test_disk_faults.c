@@ -190,8 +190,8 @@ static void a_file_with_fewer_bytes_than_its_size(void **state)
     bt_errors_free(&err);
 }
 
-/// Nothing, zeros, or HDF5: what a file of ours is before its seal. A seal is found at the end, and of a format of
-/// before at the front; anything else is somebody else's.
+/// Nothing, zeros, or HDF5: what a file of ours is before its seal. A seal is found at the end, that of
+/// an earlier format at the front; anything else is somebody else's.
 static void what_was_cut_off_early_is_ours(void **state)
 {
     (void)state;
