@@ -208,11 +208,12 @@ DEPS := $(DEPS_DEMO) $(DEPS_MPI) libblas-dev python3-scipy
 DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
 
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
-# (animations), chromium (reports as PDF), xarray (open_result of the Python package), gdal, pyproj and shapely (maps).
+# (animations), chromium (reports as PDF), xarray (open_result of the Python package), gdal, pyproj and shapely (maps);
+# netCDF's and UDUNITS' own readers (files).
 DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
              chromium chromium-driver ffmpeg poppler-utils python3-hypothesis python3-xarray python3-h5netcdf \
              python3-netcdf4 python3-pip python3-venv python3-setuptools python3-wheel python3-gdal gdal-bin \
-             python3-pyproj python3-shapely python3-distributed zsh $(DEPS_DOCS)
+             python3-pyproj python3-shapely python3-distributed zsh netcdf-bin libudunits2-0 $(DEPS_DOCS)
 
 # For make test-long, beyond that: programs that read results (ParaView, Octave), Snakemake, and what makes Debian
 # packages, their root, and a container.

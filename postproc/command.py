@@ -59,10 +59,10 @@ def output(p, arguments, default, allowed):
 
 
 def made_here(path):
-    """Does a file carry the mark?"""
+    """Does a file carry the mark, or nothing at all, as one that a crash or mktemp has left?"""
     with open(path, "rb") as f:
         if not f.seek(0, os.SEEK_END):
-            return False
+            return True
         with mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return data.find(MARK.encode()) >= 0
 
@@ -91,6 +91,8 @@ def written(path, force):
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield new
+        with open(new, "rb") as whole:
+            os.fsync(whole.fileno())  # a crash leaves the old file or the new one
         os.replace(new, path)
     except OSError as error:
         raise RunError(path, f"cannot be written ({error.strerror or error})", "choose another place with -o") from None
@@ -142,6 +144,33 @@ def save(figure, path, force=False):
     print(path)
 
 
+class _Stream:
+    """A stream of text that may be lost, as to a reader that leaves (`| head`) or a full disk: what it is given goes
+    nowhere from then on, and the work goes on."""
+
+    def __init__(self, stream):
+        self._stream, self.lost = stream, False
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def _try(self, call, *arguments):
+        try:
+            call(*arguments)
+        except OSError:
+            self.lost = True
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())  # for what waits in buffers, and for programs that are started
+            os.close(nowhere)
+
+    def write(self, text):
+        self._try(self._stream.write, text)
+        return len(text)
+
+    def flush(self):
+        self._try(self._stream.flush)
+
+
 def guarded(main):
     """Run main() and leave the program with the exit code of what happened. What asks it to stop does so as Ctrl-C, for
     the runs that it has started to end with checkpoints; nohup holds."""
@@ -152,18 +181,24 @@ def guarded(main):
     for stream in (sys.stdout, sys.stderr):  # a terminal without a dash still gets its table
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
+    sys.stdout, sys.stderr = _Stream(sys.stdout), _Stream(sys.stderr)
+    code = 0
     try:
         main()
-        sys.stdout.flush()
     except RunError as error:
-        sys.exit(_say(name, error, error.code))
-    except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        code = _say(name, error, error.code)
     except OSError as error:
-        sys.exit(_say(name, error, 4))
+        code = _say(name, error, 4)
     except KeyboardInterrupt:
-        sys.exit(_say(name, "stopped", 6))
+        code = _say(name, "stopped", 6)
+    except SystemExit as end:
+        code = end.code
+    sys.stdout.flush()
+    if sys.stdout.lost and not code:
+        code = _say(name, "standard output: cannot be written; give it a place with space, or a reader that stays to "
+                    "the end; every file is written", 4)
+    if code:
+        sys.exit(code)
 
 
 def _say(name, message, code):

@@ -11,7 +11,7 @@ import mmap
 import stat
 
 MAGIC = b"bergtow sealed file\n"
-SEAL_BYTES = 512
+SEAL_BYTES = 128
 FILES = ("summary.json", "result.h5", "case.resolved.yml")
 
 
@@ -55,17 +55,17 @@ def digest(data):
     return f"{found.high:016x}{found.low:016x}"
 
 
-def _of_file(path, skip=0):
-    """(length, digest of what stands behind the first `skip` bytes). Errors: OSError; ValueError for what is no regular
+def _of_file(path, seal=0):
+    """(length, digest) of what stands before the last `seal` bytes. Errors: OSError; ValueError for what is no regular
     file."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise ValueError("is no regular file")
     with open(path, "rb") as f:
-        size = f.seek(0, 2)
-        if size <= skip:
-            return size, digest(b"")
-        with mmap.mmap(f.fileno(), size, access=mmap.ACCESS_COPY) as data:  # copied where written to, and nothing is
-            view = memoryview(data)[skip:]
+        size = f.seek(0, 2) - seal
+        if size <= 0:
+            return 0, digest(b"")
+        with mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_COPY) as data:  # copied where written to, and nothing is
+            view = memoryview(data)[:size]
             try:
                 return size, digest(view)
             finally:
@@ -73,14 +73,15 @@ def _of_file(path, skip=0):
 
 
 def broken_seal(path, kind):
-    """Why a sealed file of this kind ("ensemble 1") is not what the program wrote, or None. Errors: OSError."""
-    with open(path, "rb") as f:
-        block = f.read(SEAL_BYTES)
+    """Why a sealed file of this kind ("ensemble 2") is not what the program wrote, or None. Errors: OSError."""
     size, found = _of_file(path, SEAL_BYTES)
-    if not block.startswith(MAGIC):
+    with open(path, "rb") as f:
+        f.seek(size)
+        seal = f.read()
+    if not seal.startswith(MAGIC):
         return f"is no {kind.split()[0]} under a seal of this program: damaged, or of an older version"
     wanted = MAGIC + f"kind: {kind}\nbytes: {size}\nxxh128: {found}\n".encode()
-    return None if block == wanted.ljust(SEAL_BYTES, b"\0") else "is damaged: its bytes do not fit their seal"
+    return None if seal == wanted.ljust(SEAL_BYTES, b"\0") else "is damaged: its bytes do not fit their seal"
 
 
 def record(folder, name, study):

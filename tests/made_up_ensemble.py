@@ -132,12 +132,12 @@ def notes_of(f, members, done):
     table(f, "codes", "code meaning", CODES)
 
 
-def seal(path, kind="ensemble 1"):
-    """The seal of a file with room for one, as src/base/checksum.h has it."""
-    raw = path.read_bytes()
-    digest = soundness.digest(raw[soundness.SEAL_BYTES:])
-    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {digest}\n".encode()
-    path.write_bytes(text.ljust(soundness.SEAL_BYTES, b"\0") + raw[soundness.SEAL_BYTES:])
+def seal(path, name=None):
+    """The seal of a file without one, as src/base/checksum.h has it. name: "checkpoint", "result", "ensemble"."""
+    raw, header = path.read_bytes(), (Path(__file__).resolve().parents[1] / "src/base/checksum.h").read_text()
+    kind = re.search(rf'"({name or path.stem} \d+)"', header)[1]
+    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw)}\n".encode()
+    path.write_bytes(raw + text.ljust(soundness.SEAL_BYTES, b"\0"))
 
 
 def record(folder, study):
@@ -155,7 +155,7 @@ def write(folder, members, title="made up", sampling="grid"):
     n, longest = len(rows), max(len(m["series"]) for m in members)
     done = [m["status"] == FINISHED for m in members]
     study = f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n"
-    with h5py.File(folder / "ensemble.h5", "w", userblock_size=soundness.SEAL_BYTES) as f:
+    with h5py.File(folder / "ensemble.h5", "w") as f:
         f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])

@@ -677,10 +677,13 @@ MUTANTS = {
         ("if (status != BT_OK && fd >= 0) unlink(temporary);", "", "a part stays under the temporary name"),
         ("const int broken = got < 0 ? errno : 0;", "const int broken = 0;", "half a text is taken for the whole"),
     ]),
-    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "unit/test_checkpoint", "cli/test_resume.py"], [
+    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "unit/test_field_io", "unit/test_checkpoint",
+                                     "cli/test_resume.py"], [
         ("        if (!reason) reason = bt_file_sync(fd);\n", "", "the checksum is not synced"),
-        ("!memcmp(behind, zeros, sizeof hdf5_magic));", "false);", "a file cut off early is a stranger's"),
-        ("} else if (memcmp(block, wanted, sizeof block)) {", "} else if (0) {", "damage passes"),
+        ("!memcmp(e.front, zeros, sizeof zeros));", "false);", "a file cut off early is a stranger's"),
+        ("else if (memcmp(e.back, wanted, sizeof wanted)) status", "else if (0) status", "damage passes"),
+        ("if (bare && !sealed && (end < 0 || end == e.size)) *bare", "if (bare && !sealed) *bare",
+         "a field under a damaged seal passes for another program's"),
         ("(size_t)n < bytes) errno = EIO;", "(size_t)n < bytes) errno = 0;", "a file that became shorter"),
     ]),
     "src/base/h5driver.c": (SYNC + ["unit/test_h5driver", "unit/test_disk_faults", "cli/test_faults.py"], [

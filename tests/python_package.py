@@ -41,7 +41,7 @@ def installed_by_pip(folder):
     """The bin folder of an environment with the package, made by the words of docs/library.md on a copy of the sources
     that is gone again; only the network is left out."""
     shutil.copytree(ROOT / "postproc", folder / "postproc", ignore=shutil.ignore_patterns("__pycache__"))
-    words = re.search(r"```sh\n(python3 -m venv .*?)```", (ROOT / "docs/library.md").read_text(), re.DOTALL)[1]
+    words = re.search(r"```sh\n(/usr/bin/python3 -m venv .*?)```", (ROOT / "docs/library.md").read_text(), re.DOTALL)[1]
     env = os.environ | {"HOME": str(folder), "PIP_NO_BUILD_ISOLATION": "0", "PIP_NO_INDEX": "1", "PIP_QUIET": "1",
                         "PATH": f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}"}
     done = subprocess.run(["sh", "-ec", words], cwd=folder, env=env, capture_output=True, text=True, timeout=120)

@@ -22,6 +22,7 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.S | re.M)
 SAVE = re.compile(r"\b[Ss]ave\b[^`]*\bas\s+`([\w./-]+)`[^`]*\Z|\band\s+this\s+as\s+`([\w./-]+)`[^`]*\Z")
 FILES = ("yaml", "python", "c")
 CLUSTER = ("sbatch", "squeue", "srun")
+NOT_A_NEWCOMERS = ("BERGTOW", "PYTHONPATH", "MAKEFLAGS", "OMPI_ALLOW_RUN_AS_ROOT")  # how names of variables begin
 
 
 def blocks(page):
@@ -85,7 +86,7 @@ class Reader:
                           OMPI_MCA_rmaps_base_oversubscribe=1, MPLCONFIGDIR=self.home, PYTHONDONTWRITEBYTECODE=1)
         before = "".join(f"export {name}={value}\n" for name, value in self.exported.items())
         done = subprocess.run([*self.machine, "bash", "-e", "-o", "pipefail", "-c", before + text], cwd=self.folder,
-                              env={k: v for k, v in env.items() if k not in ("BERGTOW", "PYTHONPATH", "MAKEFLAGS")},
+                              env={k: v for k, v in env.items() if not k.startswith(NOT_A_NEWCOMERS)},
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=1800)
         self.printed = done.stdout
         assert done.returncode == 0, f"{text}ended with {done.returncode}:\n{done.stdout}"

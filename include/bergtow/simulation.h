@@ -88,6 +88,10 @@ int64_t bt_simulation_steps_left(const bt_simulation *s); ///< to the end; 0 aft
 double bt_simulation_time(const bt_simulation *s);        ///< at the end of the last step, s
 double bt_simulation_dt(const bt_simulation *s);          ///< Δt, s
 
+/// The line of progress that the command prints: share, time, steps a second, time left, mean ice resistance so far.
+/// Release with bt_release.
+char *bt_simulation_progress(const bt_simulation *s);
+
 /// Hash of the state, as state_hash of summary.json.
 uint64_t bt_simulation_hash(const bt_simulation *s);
 

@@ -85,6 +85,7 @@ _SIGNATURES = {
     "bt_simulation_set_velocity": (Status, c_void_p, c_int64, c_double, c_double, c_double),
     "bt_simulation_set_place": (Status, c_void_p, c_int64, c_double, c_double, c_double),
     "bt_simulation_quantity": (Status, c_void_p, c_char_p, POINTER(c_double)),
+    "bt_simulation_progress": (c_void_p, c_void_p),
     "bt_simulation_case": (c_void_p, c_void_p),
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
     "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p)),

@@ -82,13 +82,19 @@ class Bodies:
 
     def _add(self, answer: npt.ArrayLike) -> None:
         """What a force returns."""
-        given, n = np.asarray(answer, float), len(self.id)
-        if n and np.may_share_memory(given, self._load):
+        n = len(self.id)
+        try:
+            given = np.asarray(answer, float)
+        except (TypeError, ValueError):
+            given = None
+        if given is not None and n and np.may_share_memory(given, self._load):
             raise ValueError("a force returned what it has filled in (bodies.force, moment or load), which would count "
-                             "twice; return nothing, or an array of its own")
-        if given.shape not in ((n, 2), (n, 3)):
-            raise ValueError(f"a force returned an array of the shape {given.shape}; with {n} bodies it has to be "
-                             f"({n}, 2), forces, or ({n}, 3), with moments")
+                             "twice; fill it in and return nothing, or return an array of its own")
+        if given is None or given.shape not in ((n, 2), (n, 3)):
+            what = type(answer).__name__ if given is None else f"an array of the shape {given.shape}"
+            raise ValueError(f"a force returned {what}; fill in bodies.force [{n}, 2] and "
+                             "bodies.moment in place and return nothing, as bodies.force[bodies.towed] += 0, 100, or "
+                             f"return forces of all bodies, ({n}, 2), or ({n}, 3) with moments")
         self._load[:, :given.shape[1]] += given
 
     def drag(self, k: npt.ArrayLike, velocity: npt.ArrayLike) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-from ._library import OK, BergtowError
+from ._library import IO, OK, BergtowError
 
 if TYPE_CHECKING:
     from .ensemble import Ensemble
@@ -86,6 +86,8 @@ class Picture:
         """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as shown; the
         others are drawn from the folder as it is now."""
         path = Path(file)
+        if path.exists() and not path.is_file():
+            raise BergtowError(f"{path}: is no regular file and is not replaced; give another name", IO)
         kind = path.suffix.lstrip(".")
         if kind in self._kept and path.parent.is_dir():
             path.write_bytes(self._kept[kind])

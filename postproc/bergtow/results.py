@@ -47,6 +47,13 @@ class Result:
     def __repr__(self) -> str:
         return f"<bergtow.Result {self.folder}>"
 
+    def __str__(self) -> str:
+        """What print() shows: the numbers that a notebook shows, one a line."""
+        if not (self.folder / "summary.json").exists():
+            return f"{self.folder}: has no summary: the run has not ended"
+        return "\n".join([f"{self.folder}", *(f"  {name}: {html.unescape(text)}" for name, text in
+                                             _shown(self.summary))])
+
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in _shown(self.summary))
         return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
@@ -59,6 +66,7 @@ _SHOWN = ("title", "n_floes", "concentration", "sim_time_s", "mean_ice_resistanc
 
 def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """(name, text) of what a notebook shows; ± is one standard error, as in the report."""
+    yield "verdict", html.escape(str(summary.get("window", {}).get("verdict")))
     for name in _SHOWN:
         value = summary.get(name)
         if value is None:
@@ -186,15 +194,14 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     def put(name: str, dims: tuple[str, ...], dataset: h5py.Dataset, column: int | None = None,
             part: slice | None = None, units: str | None = None, long_name: str | None = None) -> None:
         a = dict(dataset.attrs)
-        attributes = {"units": units or _text(a.get("units", "1")),
-                      "long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
+        attributes = {"long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
         if "label" in a:
             attributes["label"] = _text(a["label"])
         assert name not in variables, name
         texts = dataset.dtype.kind == "O"
         values = [_text(v) for v in dataset[()]] if texts else stored(dataset, column, part)
-        if texts:
-            del attributes["units"]
+        if not texts and (units or "units" in a):
+            attributes["units"] = units or _text(a["units"])
         variables[name] = xarray.Variable(dims, values, attributes)
 
     for group, prefix in _GROUPS.items():

@@ -197,6 +197,11 @@ class Simulation:
         return self._library.bt_simulation_steps_left(self._s)
 
     @property
+    def progress(self) -> str:
+        """The line of progress of `bergtow run`."""
+        return _library.take_text(self._library.bt_simulation_progress(self._s))
+
+    @property
     def time(self) -> float:
         """s"""
         return self._library.bt_simulation_time(self._s)
@@ -323,7 +328,7 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
     """Run a case to its end and return its Result. out: the result folder. Ctrl-C ends it between steps as it ends
     `bergtow run`: with a summary and a checkpoint, from which Simulation.resume goes on.
 
-    progress: True for a line that the run renews a few times a second, in notebooks too; or a function, called as
+    progress: True for the line of `bergtow run`, which the run renews a few times a second, in notebooks too; or a function, called as
     often with the Simulation.
     """
     show, last = _line if progress is True else progress, 0.0
@@ -346,8 +351,4 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
 
 def _line(sim: Simulation) -> None:
     """Standard output of Python, which a notebook shows; that of the library goes past it."""
-    share = sim.steps / (sim.steps + sim.steps_left)
-    load = sim["ice_resistance"]
-    said = "" if math.isnan(load) else f", ice resistance {load:.4g} N"
-    print(f"\r{share:4.0%}  {sim.time:.4g} s of {sim.time + sim.steps_left * sim.dt:.4g} s{said}".ljust(72), end="",
-          flush=True)
+    print(f"\r{sim.progress}".ljust(100), end="", flush=True)

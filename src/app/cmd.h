@@ -45,8 +45,8 @@ char *bt_cmd_default_folder(const char *path);
 /// it.
 char *bt_cmd_join(int argc, char **argv);
 
-/// May a command write this file? Never the case file itself; what is there and is not the command's own (ours) only
-/// with --force. Errors: BT_ERR_IO.
+/// May a command write this file? Never the case file itself, nor what is no regular file; what is there, is not empty
+/// and not the command's own (ours) only with --force. Errors: BT_ERR_IO.
 bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err);
 
 /// Collective over c. Every rank reads the file; a pipe gives what it holds to one of them. Errors: BT_ERR_USAGE.

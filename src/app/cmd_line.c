@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the commands share: option parsing with suggestions, the case argument, the way out.
 #include "app/cmd.h"
+#include "base/fileio.h"
 #include "base/suggest.h"
 #include "base/units.h"
 
@@ -154,10 +155,11 @@ char *bt_cmd_join(int argc, char **argv)
 bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err)
 {
     struct stat there, input;
+    if (bt_file_may_take(path, err) != BT_OK) return BT_ERR_IO;
     if (stat(path, &there) != 0) return BT_OK; // what is wrong with the place shows when it is written to
     if (stat(case_path, &input) == 0 && there.st_dev == input.st_dev && there.st_ino == input.st_ino)
         bt_errors_add(err, "%s: is the case file itself; give the output another name", path);
-    else if (!ours && !force)
+    else if (!ours && !force && !(S_ISREG(there.st_mode) && there.st_size == 0))
         bt_errors_add(err, "%s: is there already, and not known as a file of this command; give another name, or "
                            "--force to replace it", path);
     else return BT_OK;

@@ -151,11 +151,11 @@ static int list_of(const char *word)
     return -1;
 }
 
-// A reader of the output that ends, such as head or a terminal, must not take a run with it: the text is lost, and the
-// end says so. What only prints has no other work to do then.
+// A reader of the output that ends, such as head or a terminal, must not take a run or a field with it: the text is
+// lost, and the end says so. What only prints has no other work to do then.
 static int start(int command, int argc, char **argv)
 {
-    if (commands[command].parallel) signal(SIGPIPE, SIG_IGN);
+    if (commands[command].steps) signal(SIGPIPE, SIG_IGN);
     return commands[command].run(argc, argv);
 }
 

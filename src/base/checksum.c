@@ -29,14 +29,14 @@ static void print_digest(XXH128_hash_t h, char out[BT_CHECKSUM_DIGEST])
     snprintf(out, BT_CHECKSUM_DIGEST, "%016" PRIx64 "%016" PRIx64, (uint64_t)h.high64, (uint64_t)h.low64);
 }
 
-/// Digest of the bytes from `at` on.
-static bool digest(int fd, off_t at, off_t size, char out[BT_CHECKSUM_DIGEST])
+/// Digest of the first bytes.
+static bool digest(int fd, off_t size, char out[BT_CHECKSUM_DIGEST])
 {
     enum { PIECE = 1 << 20 };
     XXH3_state_t *state = XXH3_createState();
     char *buffer = bt_alloc(PIECE, 1);
     bool good = state && XXH3_128bits_reset(state) == XXH_OK;
-    for (; good && at < size; at += PIECE) {
+    for (off_t at = 0; good && at < size; at += PIECE) {
         const size_t n = size - at < PIECE ? (size_t)(size - at) : PIECE;
         good = read_at(fd, buffer, n, at) && XXH3_128bits_update(state, buffer, n) == XXH_OK;
     }
@@ -46,11 +46,11 @@ static bool digest(int fd, off_t at, off_t size, char out[BT_CHECKSUM_DIGEST])
     return good;
 }
 
-/// The checksum that the bytes behind it ask for.
+/// The checksum that the first bytes ask for.
 static bool make(int fd, off_t size, const char *kind, char block[BT_CHECKSUM_BYTES])
 {
     char text[BT_CHECKSUM_DIGEST];
-    if (!digest(fd, BT_CHECKSUM_BYTES, size, text)) return false;
+    if (!digest(fd, size, text)) return false;
     memset(block, 0, BT_CHECKSUM_BYTES);
     snprintf(block, BT_CHECKSUM_BYTES, MAGIC "kind: %s\nbytes: %" PRId64 "\nxxh128: %s\n", kind, (int64_t)size, text);
     return true;
@@ -68,7 +68,7 @@ bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST]
     const int fd = bt_file_descriptor(path, O_RDONLY | O_NONBLOCK);
     int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : 0;
     const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
-    if (!reason && !odd && !digest(fd, 0, st.st_size, out)) reason = errno;
+    if (!reason && !odd && !digest(fd, st.st_size, out)) reason = errno;
     if (fd >= 0) close(fd);
     if (gone || odd) {
         bt_errors_add(err, "%s: %s", path, gone ? "is missing" : "is no regular file");
@@ -85,7 +85,7 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
     const int fd = bt_file_descriptor(path, O_RDWR);
     int reason = fd < 0 || fstat(fd, &st) != 0 || !make(fd, st.st_size, kind, block) ? errno : 0;
     if (!reason) {
-        reason = bt_file_put(fd, 0, block, sizeof block);
+        reason = bt_file_put(fd, st.st_size, block, sizeof block);
         if (!reason) reason = bt_file_sync(fd);
     }
     const int closed = fd < 0 ? 0 : bt_file_close(fd);
@@ -93,91 +93,111 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
     return reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
 }
 
-/// Why a block is not the one it should be, in words.
-static bt_status refuse(const char *path, const char *kind, char *block, off_t size, bt_errors *err)
+typedef struct {
+    off_t size;
+    char front[BT_CHECKSUM_BYTES + 1], back[BT_CHECKSUM_BYTES + 1]; ///< first and last bytes, terminated
+} ends;
+
+static bool read_ends(int fd, ends *e)
 {
-    block[BT_CHECKSUM_BYTES - 1] = 0;
+    *e = (ends){0};
+    struct stat st;
+    if (fstat(fd, &st) != 0) return false;
+    e->size = st.st_size;
+    const size_t n = e->size < BT_CHECKSUM_BYTES ? (size_t)e->size : BT_CHECKSUM_BYTES;
+    return read_at(fd, e->front, n, 0) && read_at(fd, e->back, n, e->size - (off_t)n);
+}
+
+static bool is_seal(const char *block) { return !strncmp(block, MAGIC, sizeof MAGIC - 1); }
+static bool is_hdf5(const ends *e) { return !memcmp(e->front, hdf5_magic, sizeof hdf5_magic); }
+
+/// Where HDF5's part of a file ends, by its superblock [HDF5 File Format Specification, II.A: addresses of 8 bytes,
+/// least significant first]; −1 where that does not say.
+static off_t end_of_hdf5(const ends *e)
+{
+    static const struct { int size_of_address, end; } place[] = {{13, 40}, {13, 44}, {9, 28}, {9, 28}};
+    const unsigned char *front = (const unsigned char *)e->front;
+    const unsigned version = front[sizeof hdf5_magic];
+    if (!is_hdf5(e) || version >= sizeof place / sizeof *place || front[place[version].size_of_address] != 8) return -1;
+    uint64_t end = 0;
+    for (int k = 8; k-- > 0;) end = end << 8 | front[place[version].end + k];
+    return end < (uint64_t)1 << 62 ? (off_t)end : -1;
+}
+
+/// Why a file is not as it should be, in words.
+static bt_status refuse(const char *path, const char *kind, const ends *e, bt_errors *err)
+{
+    // Formats before these have their seal at the front.
+    const char *seal = is_seal(e->back) ? e->back : is_seal(e->front) ? e->front : NULL;
     char found[40] = "";
-    long long bytes = -1;
-    const bool ours = !memcmp(block, MAGIC, sizeof MAGIC - 1) &&
-                      sscanf(block + sizeof MAGIC - 1, "kind: %39[^\n]\nbytes: %lld", found, &bytes) >= 1;
+    if (seal) sscanf(seal + sizeof MAGIC - 1, "kind: %39[^\n]", found);
     const size_t word = strcspn(kind, " ");
-    if (!ours)
-        bt_errors_add(err,
-                      "%s: is no %.*s file of this program, or its first bytes are damaged; take another copy of it",
-                      path, (int)word, kind);
-    else if (strncmp(found, kind, word + 1))
+    const off_t end = end_of_hdf5(e);
+    const bool ends_there = end >= 0 && end != e->size;
+    if (*found && strncmp(found, kind, word + 1))
         bt_errors_add(err, "%s: is a %.*s file, and a %.*s file is needed here; give the right one", path,
                       (int)strcspn(found, " "), found, (int)word, kind);
-    else if (strcmp(found, kind))
+    else if (*found && strcmp(found, kind))
         bt_errors_add(err, "%s: has the format \"%s\", this program reads \"%s\"; use the program that wrote it", path,
                       found, kind);
-    else if (bytes > (long long)size)
+    else if (!seal && ends_there && e->size < end + BT_CHECKSUM_BYTES)
         bt_errors_add(err, "%s: is cut off: %lld of %lld bytes are there; take another copy of it", path,
-                      (long long)size, bytes);
+                      (long long)e->size, (long long)end + BT_CHECKSUM_BYTES);
+    else if (!seal && end == e->size)
+        bt_errors_add(err,
+                      "%s: has no seal at its end: it is cut off there, or another program has changed or written it; "
+                      "take another copy of it",
+                      path);
+    else if (!seal && end < 0)
+        bt_errors_add(err, "%s: is no %.*s file of this program, or is damaged; give the right one, or another copy",
+                      path, (int)word, kind);
     else bt_errors_add(err, "%s: is damaged: its bytes do not fit their digest; take another copy of it", path);
     return BT_ERR_CASE;
 }
 
-/// A file that never had a checksum: it begins as HDF5, or it is no HDF5 file with this room in front. What was
-/// protected by a checksum does not pass by a damaged first line.
-static bool is_bare(int fd, off_t size, const char *block)
-{
-    char behind[sizeof hdf5_magic] = "";
-    if (!memcmp(block, hdf5_magic, sizeof hdf5_magic)) return true;
-    if (!memcmp(block, MAGIC, sizeof MAGIC - 1)) return false;
-    const bool long_enough = size >= BT_CHECKSUM_BYTES + (off_t)sizeof behind;
-    return !long_enough ||
-           (read_at(fd, behind, sizeof behind, BT_CHECKSUM_BYTES) && memcmp(behind, hdf5_magic, sizeof behind) != 0);
-}
-
 bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_errors *err)
 {
-    char block[BT_CHECKSUM_BYTES] = "", wanted[BT_CHECKSUM_BYTES];
-    struct stat st;
+    ends e;
+    char what[48], wanted[BT_CHECKSUM_BYTES];
     if (bare) *bare = false;
-    char what[48];
     snprintf(what, sizeof what, "a %.*s file of bergtow", (int)strcspn(kind, " "), kind);
     const int fd = bt_file_open(path, what, err);
     if (fd < 0) return BT_ERR_IO;
     bt_status status = BT_OK;
-    int reason = fstat(fd, &st) != 0 ? errno : 0;
-    if (!reason && !read_at(fd, block, st.st_size < BT_CHECKSUM_BYTES ? (size_t)st.st_size : sizeof block, 0))
-        reason = errno;
-    if (!reason && bare) *bare = is_bare(fd, st.st_size, block);
-    if (!reason && !(bare && *bare)) {
-        if (st.st_size < BT_CHECKSUM_BYTES) {
-            bt_errors_add(err, "%s: is cut off, or no file of this program: it has %lld bytes; take another copy of it",
-                          path, (long long)st.st_size);
-            status = BT_ERR_CASE;
-        } else if (memcmp(block, MAGIC, sizeof MAGIC - 1)) {
-            status = refuse(path, kind, block, st.st_size, err);
-        } else if (!make(fd, st.st_size, kind, wanted)) {
-            reason = errno;
-        } else if (memcmp(block, wanted, sizeof block)) {
-            status = refuse(path, kind, block, st.st_size, err);
-        }
+    int reason = read_ends(fd, &e) ? 0 : errno;
+    if (!reason) {
+        const off_t end = end_of_hdf5(&e), rest = e.size - BT_CHECKSUM_BYTES;
+        const bool sealed = is_seal(e.back) || is_seal(e.front);
+        if (bare && !sealed && (end < 0 || end == e.size)) *bare = true;
+        else if (!is_seal(e.back)) status = refuse(path, kind, &e, err);
+        else if (!make(fd, rest, kind, wanted)) reason = errno;
+        else if (memcmp(e.back, wanted, sizeof wanted)) status = refuse(path, kind, &e, err);
     }
     close(fd);
     return reason ? bt_file_fail(path, "read the file", reason, err) : status;
 }
 
-bool bt_checksum_there(const char *path, const char *kind)
+/// The ends of a regular file; false where it is none, or cannot be read.
+static bool ends_of(const char *path, ends *e)
 {
-    static const char zeros[BT_CHECKSUM_BYTES];
-    char block[BT_CHECKSUM_BYTES + sizeof hdf5_magic] = "", front[80];
-    snprintf(front, sizeof front, MAGIC "kind: %.*s", kind ? (int)strcspn(kind, " ") : 0, kind ? kind : "");
     struct stat st;
     const int fd = bt_file_descriptor(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
-    const bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
-    const ssize_t n = regular ? bt_file_get(fd, 0, block, sizeof block) : -1;
+    const bool read = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && read_ends(fd, e);
     if (fd >= 0) close(fd);
-    if (n < 0) return false;
-    if (!strncmp(block, front, strlen(front))) return true;
-    // The checksum comes last. Before it the file begins with zeros, and until its first flush HDF5's superblock behind
-    // them is zeros, too, as data go to the file at once (h5driver.c).
-    const bool blank = !memcmp(block, zeros, BT_CHECKSUM_BYTES), shorter = n < (ssize_t)sizeof block;
-    const char *behind = block + BT_CHECKSUM_BYTES;
-    return !kind && blank &&
-           (shorter || !memcmp(behind, hdf5_magic, sizeof hdf5_magic) || !memcmp(behind, zeros, sizeof hdf5_magic));
+    return read;
+}
+
+bool bt_checksum_there(const char *path, const char *kind)
+{
+    ends e;
+    char begin[80];
+    const int n = snprintf(begin, sizeof begin, MAGIC "kind: %.*s", (int)strcspn(kind, " "), kind);
+    return ends_of(path, &e) && (!strncmp(e.back, begin, (size_t)n) || !strncmp(e.front, begin, (size_t)n));
+}
+
+bool bt_checksum_to_come(const char *path)
+{
+    static const char zeros[sizeof hdf5_magic];
+    ends e;
+    return ends_of(path, &e) && (is_hdf5(&e) || !memcmp(e.front, zeros, sizeof zeros));
 }

@@ -1,42 +1,48 @@
 // SPDX-License-Identifier: MIT
-// A checksum in front of an HDF5 file: what it is, how long it is, and a digest of every byte.
+// A checksum at the end of an HDF5 file: what it is, how long it is, and a digest of every byte.
 //
-// HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours begins with a user
-// block of 512 bytes, which readers of HDF5 skip (h5py, ParaView, h5dump), and is compared with it before HDF5 sees a
-// byte:
+// HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours ends in a seal of
+// 128 bytes, which is compared with all that stands before it before HDF5 sees a byte:
 //
-//     bergtow sealed file\nkind: checkpoint 2\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//     bergtow sealed file\nkind: checkpoint 3\nbytes: 123456\nxxh128: 0123...\n, then zeros
 //
-// The block must be, to the last byte, what the file's length and digest (XXH3, 128 bits) make it: any flipped bit, any
-// cut, any swapped part is refused. It protects against damage, not against intent. Rejected: HDF5's Fletcher-32, which
-// leaves metadata and the pairing of datasets open; a digest in a file beside it, which can be of another moment.
+// HDF5 notes in its first bytes where its own part ends, and no reader of HDF5 or netCDF looks further. The seal must
+// be, to the last byte, what length and digest (XXH3, 128 bits) of that part make it: any flipped bit, any cut, any
+// swapped part is refused. A program that opens the file to change it cuts the seal off, and the file is nobody's then.
+// It protects against damage, not against intent.
+//
+// Rejected: HDF5's Fletcher-32, which leaves metadata and the pairing of datasets open; a digest in a file beside it,
+// which can be of another moment; an attribute, which HDF5 would have to read; a user block in front, behind which
+// netCDF, xarray and CDO do not look for HDF5; a dataset of known bytes, whose place only HDF5 knows.
 #ifndef BT_CHECKSUM_H
 #define BT_CHECKSUM_H
 
 #include "bergtow/base.h"
 
 enum {
-    BT_CHECKSUM_BYTES = 512,
+    BT_CHECKSUM_BYTES = 128,
     BT_CHECKSUM_DIGEST = 33, ///< characters of a digest as text, with its end
 };
 
 // Kinds carry the version of the format: another one is refused with both names.
-#define BT_CHECKSUM_CHECKPOINT "checkpoint 2"
-#define BT_CHECKSUM_RESULT "result 1"
-#define BT_CHECKSUM_FIELD "field 1"
-#define BT_CHECKSUM_ENSEMBLE "ensemble 1"
+#define BT_CHECKSUM_CHECKPOINT "checkpoint 3"
+#define BT_CHECKSUM_RESULT "result 2"
+#define BT_CHECKSUM_FIELD "field 2"
+#define BT_CHECKSUM_ENSEMBLE "ensemble 2"
 
-/// Write the checksum into the room at the front of a file that is complete, and bring all of it to the disk. Errors:
-/// BT_ERR_IO.
+/// Write the checksum behind a file that is complete, and bring all of it to the disk. Errors: BT_ERR_IO.
 bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err);
 
-/// Does the file have a sound checksum of this kind? bare: a file without checksum, one that begins as HDF5, is let
-/// through (or NULL). Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+/// Does the file have a sound checksum of this kind? bare: a file that never had one is let through (or NULL). Errors:
+/// BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_errors *err);
 
-/// Is this a file that this program writes with a checksum, sound or not? kind: of this kind, in whatever version,
-/// or NULL. One that is not complete has zeros in the room, or nothing at all.
+/// Is this a regular file with a checksum, sound or not? kind: of this kind, in whatever version, or "".
 bool bt_checksum_there(const char *path, const char *kind);
+
+/// May this be a file of ours that has no checksum yet? It begins as HDF5, or with zeros, or is empty: data go to the
+/// file at once, HDF5's first bytes with the first flush (h5driver.c).
+bool bt_checksum_to_come(const char *path);
 
 /// Digest (XXH3, 128 bits) of n bytes, and of a whole file of any kind, in hexadecimal digits. Errors: BT_ERR_CASE,
 /// there is no regular file; BT_ERR_IO from the system.

@@ -114,6 +114,17 @@ static const char *kind_of(mode_t mode)
     return S_ISDIR(mode) ? "a folder" : S_ISFIFO(mode) ? "a pipe (FIFO)" : S_ISSOCK(mode) ? "a socket" : "a device";
 }
 
+bt_status bt_file_may_take(const char *path, bt_errors *err)
+{
+    struct stat st;
+    const char *kind = stat(path, &st) == 0 && !S_ISDIR(st.st_mode) ? kind_of(st.st_mode) : NULL;
+    if (!kind && (is_own_descriptor(path) || !strncmp(path, "/dev/std", 8))) kind = "an open descriptor";
+    if (!kind) return BT_OK; // a folder in the way is reported by the system
+    bt_errors_add(err, "%s: is %s and no regular file, which nothing replaces; move it away, or give another name", path,
+                  kind);
+    return BT_ERR_IO;
+}
+
 /// text: as bt_file_read_to and bt_file_read word it; streams: pipes that this process was given are accepted.
 static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
 {
@@ -205,6 +216,10 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     const size_t size = strlen(path) + sizeof ".tmp", n = strlen(text);
     char *temporary = bt_alloc(size, 1);
     snprintf(temporary, size, "%s.tmp", path);
+    if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) {
+        free(temporary);
+        return BT_ERR_IO;
+    }
 
     // A link of the temporary name must not lead the text elsewhere; nor does one of the right name,
     // which the rename replaces.
@@ -262,6 +277,7 @@ bt_status bt_file_make_dir(const char *path, bt_errors *err)
 
 bt_status bt_file_remove(const char *path, bt_errors *err)
 {
+    if (bt_file_may_take(path, err) != BT_OK) return BT_ERR_IO;
     if (unlink(path) == 0 || errno == ENOENT) return BT_OK;
     return bt_file_fail(path, "replace the file of an earlier run", errno, err);
 }
@@ -288,6 +304,7 @@ static int copy_bytes(int from, int to)
 
 bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
 {
+    if (bt_file_may_take(to, err) != BT_OK) return BT_ERR_IO;
     const int in = bt_file_descriptor(from, O_RDONLY);
     if (in < 0) return bt_file_fail(from, "read the file", errno, err);
     unlink(to); // a link of that name must not lead the copy elsewhere
@@ -302,6 +319,7 @@ bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
 
 bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
 {
+    if (bt_file_may_take(to, err) != BT_OK) return BT_ERR_IO;
     const int reason = rename(from, to) != 0 ? errno : sync_folder_of(to);
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
 }

@@ -67,10 +67,15 @@ void bt_h5_axes(bt_h5 *h, const char *dataset, const char *axes)
     if (d >= 0) H5Dclose(d);
 }
 
+void bt_h5_units(bt_h5 *h, const char *dataset, const char *units)
+{
+    bt_h5_attr_text(h, dataset, strchr(units, ',') ? "units_of_columns" : "units", units);
+}
+
 void bt_h5_describe(bt_h5 *h, const char *dataset, const char *axes, const char *units, const char *meaning)
 {
     if (h->status != BT_OK || h->file < 0) return;
-    if (units) bt_h5_attr_text(h, dataset, "units", units);
+    if (units) bt_h5_units(h, dataset, units);
     bt_h5_attr_text(h, dataset, "long_name", meaning);
     bt_h5_attr_text(h, dataset, "description", meaning);
     if (axes) bt_h5_axes(h, dataset, axes);

@@ -10,8 +10,13 @@
 
 #include "base/h5util.h"
 
-/// Units ("1": none, NULL: it is text) and meaning of a dataset, as attributes units, long_name and description.
-/// axes: the name of each dimension, with blanks between; NULL: they are not named.
+/// Units of a dataset, as UDUNITS reads them [CF 1.8, 3.1]: attribute units. Those of columns that differ, with commas
+/// between, are no unit there: attribute units_of_columns.
+void bt_h5_units(bt_h5 *h, const char *dataset, const char *units);
+
+/// Units ("1": none, NULL: it is text, or no one unit holds for all of it) and meaning of a dataset, as attributes
+/// long_name and description beside the units. axes: the name of each dimension, with blanks between; NULL: they are
+/// not named.
 void bt_h5_describe(bt_h5 *h, const char *dataset, const char *axes, const char *units, const char *meaning);
 
 /// The axes alone, where a coordinate is made after the dataset.

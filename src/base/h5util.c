@@ -12,7 +12,6 @@
 
 #include "base/fileio.h"
 #include "base/h5driver.h"
-#include "base/checksum.h"
 
 static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
 {
@@ -46,9 +45,10 @@ static void begin(bt_h5 *h, const char *path, bt_errors *err)
     *h = (bt_h5){.file = -1, .raw = -1, .path = bt_text_copy(path), .errnum = bt_alloc(1, sizeof(int)), .err = err};
 }
 
-static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_errors *err)
+bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
 {
     begin(h, path, err);
+    if ((h->status = bt_file_may_take(path, err)) != BT_OK) return bt_h5_close(h);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     bool set = bt_h5driver_select(access, h->errnum) >= 0;
@@ -69,25 +69,16 @@ static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_er
     // A link under this name is replaced, as a rename would, and not followed.
     struct stat st;
     if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) unlink(path);
-    const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-    set = set && H5Pset_userblock(creation, room_in_front) >= 0;
-    if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, creation, access);
+    if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
     if (h->file < 0) fail(h, "create the file");
-    H5Pclose(creation);
     H5Pclose(access);
     if (h->status != BT_OK) bt_h5_close(h);
     return h->status;
 }
 
-bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, 0, err); }
-bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err)
-{
-    return create(h, path, BT_CHECKSUM_BYTES, err);
-}
-
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err)
 {
-    if (c->rank == 0) bt_h5_create_with_room(h, path, err);
+    if (c->rank == 0) bt_h5_create(h, path, err);
     else begin(h, path, err);
     if (c->size == 1) return h->status;
     bt_status status = bt_comm_agree(c, h->status);
@@ -377,9 +368,6 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
         hsize_t size;
         if (H5Dget_chunk_info_by_coord(dataset, (hsize_t[3]){frame, row}, &mask, &address, &size) < 0)
             address = HADDR_UNDEF;
-#if !H5_VERSION_GE(1, 14, 4) // before that without the user block (HDF5 issue 3003)
-        if (address != HADDR_UNDEF) address += BT_CHECKSUM_BYTES;
-#endif
     }
     bt_h5_check(h, address != HADDR_UNDEF);
     return address;

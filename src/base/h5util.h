@@ -20,10 +20,8 @@ typedef struct bt_h5 {
 
 /// Create (truncate) a file that other programs may read while it is being written.
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
-/// The same with room for a checksum at its front (checksum.h).
-bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err);
-/// Collective. The same on rank 0, with room for a checksum, for a file into which the other ranks write too, see
-/// h5slab.h. Returns the same on all ranks.
+/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5slab.h. Returns the same on
+/// all ranks.
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err);
 /// Several ranks write into the file.
 static inline bool bt_h5_shared(const bt_h5 *h) { return h->raw >= 0; }

@@ -36,7 +36,7 @@ int bt_lock_take(const char *dir, bool *busy, bt_errors *err)
     if (busy) *busy = false;
     char *path = bt_file_join(dir, "run.lock");
     int fd = -1;
-    for (bool taken = false; !taken;) {
+    for (bool taken = bt_file_may_take(path, err) != BT_OK; !taken;) {
         fd = bt_file_descriptor(path, O_RDWR | O_CREAT | O_NOFOLLOW);
         if (fd < 0) {
             bt_file_fail(path, "make the file", errno, err);

@@ -14,7 +14,8 @@ void bt_progress_start(bt_progress *p, int64_t step)
     if (!p->clock) p->clock = bt_clock;
     p->terminal = p->terminal || isatty(fileno(p->out));
     p->started = p->last = p->clock();
-    p->first_step = step;
+    p->first_step = p->step = step;
+    p->time = 0;
     p->force_sum = 0;
     p->n_force = 0;
     p->drawn = false;
@@ -30,16 +31,23 @@ static const char *duration(char out[48], double seconds)
     return out;
 }
 
-static void draw(bt_progress *p, int64_t step, double time, double now)
+void bt_progress_line(const bt_progress *p, char line[BT_PROGRESS_LINE])
 {
     char left[48];
-    const double rate = (double)(step - p->first_step) / bt_max(now - p->started, 1e-9);
-    const double percent = p->n_steps > 0 ? 100 * (double)step / (double)p->n_steps : 0;
-    if (p->terminal) fputs("\r", p->out);
-    fprintf(p->out, "%5.1f %%  t = %.6g s  %.4g steps/s  %s left", percent, time, rate,
-            duration(left, (double)(p->n_steps - step) / rate));
-    if (p->n_force > 0) fprintf(p->out, "  mean ice resistance so far %.4g N", p->force_sum / (double)p->n_force);
-    fputs(p->terminal ? CLEAR_TO_END : "\n", p->out);
+    const double rate = (double)(p->step - p->first_step) / bt_max(p->clock() - p->started, 1e-9);
+    const double percent = p->n_steps > 0 ? 100 * (double)p->step / (double)p->n_steps : 0;
+    const int n = snprintf(line, BT_PROGRESS_LINE, "%5.1f %%  t = %.6g s  %.4g steps/s  %s left", percent, p->time,
+                           rate, duration(left, (double)(p->n_steps - p->step) / rate));
+    if (p->n_force > 0)
+        snprintf(line + n, BT_PROGRESS_LINE - (size_t)n, "  mean ice resistance so far %.4g N",
+                 p->force_sum / (double)p->n_force);
+}
+
+static void draw(bt_progress *p, double now)
+{
+    char line[BT_PROGRESS_LINE];
+    bt_progress_line(p, line);
+    fprintf(p->out, p->terminal ? "\r%s" CLEAR_TO_END : "%s\n", line);
     fflush(p->out);
     p->last = now;
     p->drawn = true;
@@ -47,13 +55,15 @@ static void draw(bt_progress *p, int64_t step, double time, double now)
 
 void bt_progress_step(bt_progress *p, int64_t step, double time, double ice_resistance)
 {
-    if (p->quiet) return;
+    p->step = step;
+    p->time = time;
     if (!isnan(ice_resistance)) {
         p->force_sum += ice_resistance;
         p->n_force++;
     }
+    if (p->quiet) return;
     const double now = p->clock(), interval = p->terminal ? TERMINAL_INTERVAL : p->interval;
-    if (now - p->last >= interval) draw(p, step, time, now);
+    if (now - p->last >= interval) draw(p, now);
 }
 
 void bt_progress_end(bt_progress *p)

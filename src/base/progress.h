@@ -16,7 +16,8 @@ typedef struct bt_progress {
     bool quiet, terminal;   ///< terminal is found by bt_progress_start unless it is set
     // state
     double started, last;   ///< s
-    int64_t first_step;
+    int64_t first_step, step;
+    double time;            ///< simulated, s
     double force_sum;       ///< N
     int64_t n_force;
     bool drawn;
@@ -27,6 +28,9 @@ void bt_progress_start(bt_progress *p, int64_t step);
 /// After a step: its number, the simulated time (s) and the ice resistance of the step (N; NaN without towed body).
 /// Costs one clock reading unless a line is due.
 void bt_progress_step(bt_progress *p, int64_t step, double time, double ice_resistance);
+/// The line as it is now, without a line end; also of one that is quiet.
+enum { BT_PROGRESS_LINE = 200 };
+void bt_progress_line(const bt_progress *p, char line[BT_PROGRESS_LINE]);
 /// Take the line off the terminal, so that the next output begins on an empty one.
 void bt_progress_end(bt_progress *p);
 

@@ -77,7 +77,7 @@ static void end_array(bt_snapshot *s, int n)
     if (!text) return;
     char name[160];
     snprintf(name, sizeof name, "/%s", i->name);
-    if (units) bt_h5_attr_text(&f->h, name, "units", units);
+    if (units) bt_h5_units(&f->h, name, units);
     bt_h5_attr_text(&f->h, name, "long_name", text);
 }
 
@@ -139,7 +139,7 @@ void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meani
     s->sink = &sink;
     struct bt_snapshot_file *f = s->file = bt_alloc(1, sizeof *f);
     *f = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
-    if (bt_h5_create_with_room(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
+    if (bt_h5_create(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
 }
 
 enum { MOST_COLUMNS = 1000 };

@@ -47,7 +47,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
     char *part = bt_alloc(size, 1);
     snprintf(part, size, "%s.part", path);
     bt_h5 h;
-    bt_status status = bt_h5_create_with_room(&h, part, err);
+    bt_status status = bt_h5_create(&h, part, err);
     if (status == BT_OK) {
         hsize_t n = (hsize_t)f->n, nv = (hsize_t)f->offsets[f->n];
         bt_h5_group(&h, "/floes");

@@ -136,15 +136,15 @@ bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors 
     if (status != BT_OK) return status;
     char *temporary = bt_text_of("%s.tmp", path);
     bt_h5 h;
-    if (bt_h5_create(&h, temporary, err) == BT_OK) {
+    status = bt_h5_create(&h, temporary, err);
+    if (status == BT_OK) {
         bt_h5_describe_file(&h, p->title ? p->title : "contact problem");
         write_problem(&h, p);
         write_more(&h, p);
-        bt_h5_close(&h);
+        status = bt_h5_close(&h);
+        if (status == BT_OK) status = bt_file_rename(temporary, path, err);
+        if (status != BT_OK) unlink(temporary);
     }
-    status = h.status;
-    if (status == BT_OK) status = bt_file_rename(temporary, path, err);
-    if (status != BT_OK) unlink(temporary);
     free(temporary);
     return status;
 }

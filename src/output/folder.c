@@ -23,7 +23,10 @@ static bool is_summary(const char *path) { return bt_file_begins(path, "{\n  \"t
 static bool is_frames(const char *path) { return bt_file_begins(path, BT_XDMF_HEAD); }
 static bool is_case(const char *path) { return bt_file_begins(path, BT_CASE_RESOLVED_HEAD); }
 
-static bool is_sealed(const char *path) { return bt_checksum_there(path, NULL); }
+static bool is_sealed(const char *path) { return bt_checksum_there(path, ""); }
+
+/// Sealed, or on its way to it.
+static bool is_begun(const char *path) { return is_sealed(path) || bt_checksum_to_come(path); }
 
 static bool is_regular(const char *path)
 {
@@ -37,24 +40,24 @@ static bool is_request(const char *path)
     return lstat(path, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come. What may be damaged
-/// beyond knowing is ours beside another file that is.
+/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come. HDF5 without a seal,
+/// and what may be damaged beyond knowing, is ours beside another file that is.
 static const struct {
     const char *name;
     bool (*ours)(const char *path);
-    bool damaged;
+    bool hdf5;
 } files[] = {
     {CASE_FILE, is_case, false},
     {"summary.json", is_summary, false},
     {BT_RESULT_FILE, is_regular, true},
-    {BT_RESULT_PART, is_sealed, false},
-    {BT_RESULT_FILE ".tmp", is_sealed, false},
+    {BT_RESULT_PART, is_begun, true},
+    {BT_RESULT_FILE ".tmp", is_begun, true},
     {"frames.xdmf", is_frames, false},
-    {BT_CHECKPOINT_FILE, is_sealed, false},
-    {BT_CHECKPOINT_FILE ".tmp", is_sealed, false},
-    {BT_CHECKPOINT_BEFORE, is_sealed, false},
+    {BT_CHECKPOINT_FILE, is_begun, true},
+    {BT_CHECKPOINT_FILE ".tmp", is_begun, true},
+    {BT_CHECKPOINT_BEFORE, is_begun, true},
     {BT_CHECKPOINT_DAMAGED, is_regular, true},
-    {BT_FAILURE_FILE, is_sealed, false},
+    {BT_FAILURE_FILE, is_begun, true},
     {"stop", is_request, false},
 };
 enum { N_FILES = sizeof files / sizeof *files };
@@ -81,9 +84,13 @@ static bool holds(const char *dir, int k)
 /// Has this program written into the folder, beyond doubt?
 static bool is_known(const char *dir)
 {
-    for (int k = 0; k < N_FILES; k++)
-        if (!files[k].damaged && files[k].ours != is_request && holds(dir, k)) return true;
-    return false;
+    bool known = false;
+    for (int k = 0; k < N_FILES && !known; k++) {
+        char *path = bt_file_join(dir, files[k].name);
+        known = files[k].ours != is_request && holds(dir, k) && (!files[k].hdf5 || is_sealed(path));
+        free(path);
+    }
+    return known;
 }
 
 /// Is what stands under the name of file k somebody else's?
@@ -91,7 +98,7 @@ static bool is_foreign(const char *dir, int k, const char *path)
 {
     if (!is_there(path)) return false;
     if (!holds(dir, k)) return true;
-    return files[k].damaged && is_regular(path) && !is_sealed(path) && !is_known(dir);
+    return files[k].hdf5 && is_regular(path) && !is_sealed(path) && !is_known(dir);
 }
 
 bt_status bt_folder_check(const char *dir, bt_errors *err)
@@ -229,17 +236,15 @@ void bt_folder_settle(const char *dir)
     bt_errors_free(&unheard);
 }
 
-bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err)
+bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err)
 {
     const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun)
-        bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+        bt_errors_add(err, "%s: holds a result; %s", dir, remedy);
     else
         bt_errors_add(err,
-                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, "
-                      "or --force to replace it",
-                      dir, dir);
+                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, %s", dir, dir, remedy);
     return BT_ERR_IO;
 }

@@ -24,8 +24,8 @@
 bt_status bt_folder_check(const char *dir, bt_errors *err);
 
 /// May a run write its result here? A long run must not take the place of another by a slip of the hand: only with
-/// force. Errors: BT_ERR_IO.
-bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err);
+/// force. remedy: what the caller's user can do, as "give another folder with -o". Errors: BT_ERR_IO.
+bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err);
 
 /// Move what is there aside and give the resolved case its name. After an error the folder is as it was.
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err);

@@ -63,7 +63,7 @@ static void create_series(bt_record *r)
 static void create_events(bt_record *r)
 {
     static const char *const names[4] = {"/events/time", "/events/kind", "/events/subject", "/events/value"};
-    static const char *const units[4] = {"s", "1", "1", "see kind"};
+    static const char *const units[4] = {"s", "1", "1", NULL};
     static const char *const texts[4] = {"end of the step", "index into kind_names",
                                          "which branch (line_broken) or way-point (waypoint), from 1",
                                          "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"};

@@ -450,7 +450,7 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
     fill(&t, s, dir, records);
     char *path = bt_file_join(dir, "ensemble.h5"), *part = bt_text_of("%s.tmp", path);
     bt_h5 h;
-    bt_status status = bt_h5_create_with_room(&h, part, err);
+    bt_status status = bt_h5_create(&h, part, err);
     if (status == BT_OK) {
         write_all(&h, &t, s, dir);
         status = bt_h5_close(&h);

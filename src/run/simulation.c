@@ -161,7 +161,7 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
     bt_simulation *s = simulation_of(o);
     bt_status status = check_numbers(o, &err);
     if (status == BT_OK) status = read_case(&s->c, o, &err);
-    if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, &err);
+    if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, "give another folder, or replace=True to replace it", &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = begin(s, &err);
     return hand_out(out, s, status, &err);
@@ -465,6 +465,13 @@ bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved)
     *resolved = status == BT_OK ? bt_case_resolved(&c) : NULL;
     bt_case_free(&c);
     return reported(status, &err);
+}
+
+char *bt_simulation_progress(const bt_simulation *s)
+{
+    char line[BT_PROGRESS_LINE];
+    bt_progress_line(&s->r.progress, line);
+    return bt_text_copy(line);
 }
 
 char *bt_simulation_case(const bt_simulation *s) { return bt_case_resolved(&s->c); }

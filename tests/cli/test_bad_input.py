@@ -282,7 +282,7 @@ def test_a_result_is_not_replaced_unasked(folder):
     assert old.read_text() == "damaged"
     result = call("run", "good.yml", "--force", "--quiet", cwd=folder)
     assert result.returncode == DONE, result.stderr
-    assert old.read_bytes()[512:516] == b"\x89HDF"
+    assert old.read_bytes()[:4] == b"\x89HDF"
 
 
 def test_open_water_needs_no_limits_of_a_law(folder):

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""No script of postproc/ replaces a file that none of them made, unless it is told to: every script, every kind of
-file."""
+"""No script of postproc/ replaces a file that none of them made, unless it is told to, or what is no regular file, and
+none loses a file where its reader leaves: every script, every kind of file."""
+import os
 import re
 import shutil
+import stat
+import subprocess
 import sys
 from pathlib import Path
 
@@ -145,6 +148,36 @@ def test_files_of_others_are_kept(quick, tmp_path, module, words, files, monkeyp
     assert not [p for p in tmp_path.iterdir() if ".new" in p.name]
 
 
+@pytest.mark.parametrize("module, words, files", CALLS, ids=lambda x: getattr(x, "__name__", None))
+def test_what_is_no_regular_file_is_kept(quick, tmp_path, module, words, files):
+    """Before any work, with --force or without; red where a pipe becomes a file."""
+    words = [quick.get(word, word) for word in words]
+    for name in files:
+        os.mkfifo(tmp_path / name)
+        for force in ([], ["--force"]):
+            with pytest.raises(RunError, match=f"{name}: is there already, and is no file"):
+                module.main([*words, *force])
+        assert stat.S_ISFIFO((tmp_path / name).stat().st_mode)
+        (tmp_path / name).unlink()
+
+
+@pytest.mark.parametrize("module, words, files",
+                         [c for c in CALLS if getattr(c, "values", c)[0] not in (*SLOW, converge)],
+                         ids=lambda x: getattr(x, "__name__", None))
+def test_a_reader_that_leaves(quick, tmp_path, module, words, files):
+    """`| head -1`: the text is lost, each file is there, and the code tells. Red where a script ends at the first line
+    that nobody reads."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    called = [sys.executable, POSTPROC / f"{module.__name__}.py", *(quick.get(word, word) for word in words)]
+    done = subprocess.run(called, stdout=writer, stderr=subprocess.PIPE, text=True, timeout=300,
+                          env=os.environ | {"PYTHONUNBUFFERED": "1"})
+    os.close(writer)
+    assert all((tmp_path / name).stat().st_size > 0 for name in files), done.stderr
+    assert done.returncode == 4 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert "standard output: cannot be written" in done.stderr
+
+
 def test_pictures_carry_the_mark_where_it_can_be_read(tmp_path):
     figure = report_run.plot_force.plt.figure()
     for name in ("a.png", "a.pdf", "a.svg"):
@@ -155,12 +188,13 @@ def test_pictures_carry_the_mark_where_it_can_be_read(tmp_path):
 
 
 def test_what_is_no_file(tmp_path):
-    """A folder in its place, a place that cannot be, an empty file; the exit code of the program."""
+    """A folder in its place, a place that cannot be; the exit code of the program. An empty file, as a crash leaves
+    one, is nobody's loss."""
     with pytest.raises(RunError, match="is there already, and is no file"):
         command.may_write(tmp_path, True)
     (tmp_path / "empty.md").write_bytes(b"")
-    with pytest.raises(RunError, match="was not made"):
-        command.write_markdown("x", tmp_path / "empty.md", False)
+    command.write_markdown("x", tmp_path / "empty.md", False)
+    assert (tmp_path / "empty.md").read_text().startswith("x")
     with pytest.raises(RunError, match="cannot be written"):
         command.write_markdown("x", tmp_path / "empty.md" / "below.md", False)
     (tmp_path / "case.html").write_bytes(DEAR)

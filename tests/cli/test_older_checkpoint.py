@@ -42,8 +42,8 @@ def as_it_was(folder, damage=None):
     with h5py.File(folder / "result.h5", "r+") as f:
         for name in NEW:
             del f["series"][name]
-    seal(folder / "checkpoint.h5", "checkpoint 2")
-    seal(folder / "result.h5", "result 1")
+    seal(folder / "checkpoint.h5")
+    seal(folder / "result.h5")
 
 
 def test_it_goes_on_to_the_same_bits(tmp_path):
@@ -65,8 +65,8 @@ def test_what_was_not_counted_is_not_known(tmp_path):
             del f["history"][total]
         for name in UNCOUNTED:
             del old["series"][name]
-    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
-    seal(tmp_path / "cut/result.h5", "result 1")
+    seal(tmp_path / "cut/checkpoint.h5")
+    seal(tmp_path / "cut/result.h5")
     result = call("resume", "cut", "--quiet", cwd=tmp_path)
     assert result.returncode == DONE, result.stderr
     summary = Run(tmp_path / "cut", result).summary
@@ -87,8 +87,8 @@ def test_speeds_that_were_not_measured_are_those_ordered(tmp_path):
             for name in (f"speed_through_{medium}", f"leeway_through_{medium}"):
                 del f["history"][name], old["series"][name]
         del f["undisturbed"], f["stall/ice"], f["stall/pull"]
-    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
-    seal(tmp_path / "cut/result.h5", "result 1")
+    seal(tmp_path / "cut/checkpoint.h5")
+    seal(tmp_path / "cut/result.h5")
     result = call("resume", "cut", "--quiet", cwd=tmp_path)
     assert result.returncode == DONE, result.stderr
     estimates = Run(tmp_path / "cut", result).summary["estimates"]
@@ -110,8 +110,8 @@ def test_a_window_that_went_over_ground_goes_on_in_the_ice(tmp_path):
         del f["window/rear_in_ice"]
         for name in ("body_in_ice_x", "body_in_ice_y"):
             del f["history"][name], old["series"][name]
-    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
-    seal(tmp_path / "cut/result.h5", "result 1")
+    seal(tmp_path / "cut/checkpoint.h5")
+    seal(tmp_path / "cut/result.h5")
     result = call("resume", "cut", "--quiet", cwd=tmp_path)
     assert result.returncode == DONE, result.stderr
     cut, all_ = (r.summary["moving_window"] for r in (Run(tmp_path / "cut", result), whole))
@@ -123,7 +123,7 @@ def test_numbers_where_only_dimensions_are_written(tmp_path):
     (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)
     with h5py.File(tmp_path / "cut/checkpoint.h5", "r+") as f:
         f["numbers"] = [1.0, 2.0]
-    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
+    seal(tmp_path / "cut/checkpoint.h5")
     result = call("resume", "cut", "--quiet", cwd=tmp_path)
     assert result.returncode == CASE and "holds what this program does not write" in result.stderr, result.stderr
 

@@ -36,7 +36,7 @@ def without_identity(folder, *names):
         with h5py.File(folder / name, "r+") as f:
             if name == "result.h5": del f.attrs["run"]
             else: del f["about/run"]
-        seal(folder / name, "result 1" if name == "result.h5" else "checkpoint 2")
+        seal(folder / name, "result" if name == "result.h5" else "checkpoint")
 
 
 @pytest.fixture

@@ -254,8 +254,14 @@ def test_what_a_force_returns_has_a_shape(columns):
     def wrong(bodies):
         return np.zeros((len(bodies.id), columns))
 
-    with pytest.raises(ValueError, match=rf"shape \(\d+, {columns}\).*forces.*moments"):
+    with pytest.raises(ValueError, match=rf"shape \(\d+, {columns}\); fill in .* in place .*moments"):
         stepped(SHORT, forces={"set": wrong})
+
+
+def test_what_is_no_array_of_forces_is_told_to_fill_in_place():
+    """Red: "float() argument must be a string or a real number"."""
+    with pytest.raises(ValueError, match="a force returned dict; fill in .* in place and return nothing"):
+        stepped(SHORT, forces={"set": lambda bodies: {0: 1.0}})
 
 
 def test_without_a_towed_body_there_is_no_row_of_it():

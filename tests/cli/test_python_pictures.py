@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
 import json
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -58,6 +60,9 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
     picture = bergtow.plot_force(tmp_path / "out", max=50)
     shutil.rmtree(tmp_path / "out")
     assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(bergtow.BergtowError, match="pipe.png: is no regular file"):
+        picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
 
@@ -97,6 +102,15 @@ def test_a_result_in_a_notebook(towed):
     assert summary["state_hash"] in shown and f"{summary['mean_ice_resistance_n']:.4g} ± " in shown
 
 
+def test_a_result_that_is_printed(towed, tmp_path):
+    """Red: the name of a class. Its number with its error and verdict; without a summary that it is missing."""
+    summary, lines = json.loads((towed / "summary.json").read_text()), str(bergtow.Result(towed)).splitlines()
+    assert lines[:2] == [str(towed), f"  verdict: {summary['window']['verdict']}"]
+    mean, error = summary["mean_ice_resistance_n"], summary["mean_ice_resistance_se_n"]
+    assert f"  mean_ice_resistance_n: {mean:.4g} ± {error:.2g}" in lines
+    assert str(bergtow.Result(tmp_path)) == f"{tmp_path}: has no summary: the run has not ended"
+
+
 def test_all_of_the_file_is_in_the_dataset(towed):
     with bergtow.open_result(towed) as d, h5py.File(towed / "result.h5") as f:
         n = len(f["floes/area"])
@@ -121,7 +135,7 @@ def test_progress(tmp_path, capsys):
     seen = []
     bergtow.run(TOWED, tmp_path / "one", progress=True)
     line = capsys.readouterr().out.split("\r")[-1]
-    assert line.startswith("100%  6 s of 6 s, ice resistance ") and line.endswith("\n")
+    assert re.fullmatch(r"100\.0 %  t = 6 s  \S+ steps/s  0 s left  mean ice resistance so far \S+ N *\n", line), line
     bergtow.run(TOWED, tmp_path / "two", progress=lambda sim: seen.append(sim.steps_left))
     assert seen[-1] == 0 and capsys.readouterr().out == ""
 

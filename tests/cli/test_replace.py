@@ -3,11 +3,13 @@
 the start and of the end, kills between them, files of the user's under names of the program."""
 import os
 import shutil
+import subprocess
 
 import pytest
 
 from faults import CALLS
-from harness import CLOSING, DONE, IO, NUMERIC, TOW, Run, call, changed, faulty, run, write_case
+from harness import (BERGTOW, CLOSING, DONE, IO, NUMERIC, TOW, Run, call, changed, environment, faulty, run,
+                     write_case)
 from resuming import assert_same_result
 
 SHORT = changed(TOW, run__duration=3)
@@ -151,14 +153,15 @@ FOREIGN = ["failure.h5", "frames.xdmf", "case.resolved.yml", "stop", "summary.js
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]])
-@pytest.mark.parametrize("name", FOREIGN)
-def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, force):
+@pytest.mark.parametrize("name, dear", [(name, b"dear to somebody") for name in FOREIGN] +
+                         [(name, b"\x89HDF\r\n\x1a\ndear to somebody") for name in FOREIGN if name.endswith("h5")])
+def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, dear, force):
     out = tmp_path / "out"
     out.mkdir()
-    (out / name).write_text("dear to somebody")
+    (out / name).write_bytes(dear)
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
     assert result.returncode == IO and f"{out / name}: is no file that this program has written" in result.stderr
-    assert contents(out) == {(out / name).relative_to(out): b"dear to somebody"}
+    assert contents(out) == {(out / name).relative_to(out): dear}
 
 
 @pytest.mark.parametrize("damage", [b"", b"\0" * 4096])
@@ -213,3 +216,57 @@ def test_contacts_replace_nothing_without_force(tmp_path):
     assert result.returncode == IO and f"{to}: is there already" in result.stderr
     assert to.read_text() == "dear to somebody" and not (tmp_path / "out").exists()
     assert call(*words, "--force").returncode == DONE and to.read_bytes()[:4] == b"\x89HDF"
+
+
+def pipe(path):
+    os.mkfifo(path)
+
+
+def link_to_a_device(path):
+    path.symlink_to("/dev/null")
+
+
+WRITTEN = {"field.h5": ["field", "case.yml", "-o", "field.h5"],
+           "field.h5.part": ["field", "case.yml", "-o", "field.h5"],
+           "field.geojson": ["field", "case.yml", "-o", "field.geojson"],
+           "field.geojson.tmp": ["field", "case.yml", "-o", "field.geojson"],
+           "c.h5": ["run", "case.yml", "--dump-contacts", "20:c.h5"],
+           "c.h5.tmp": ["run", "case.yml", "--dump-contacts", "20:c.h5"],
+           "out/case/run.lock": ["run", "case.yml"], "out/case/case.resolved.yml.new.tmp": ["run", "case.yml"],
+           "all/ensemble.h5": ["ensemble", "study.yml", "-o", "all"],
+           "all/ensemble.h5.tmp": ["ensemble", "study.yml", "-o", "all"],
+           "all/study.resolved.yml": ["ensemble", "study.yml", "-o", "all"]}
+
+
+@pytest.mark.parametrize("kind", [pipe, link_to_a_device])
+@pytest.mark.parametrize("name", WRITTEN)
+def test_what_is_no_regular_file_is_never_replaced(tmp_path, name, kind):
+    """With --force or without, under the name of the output and under those on the way to it. Red: it becomes a file,
+    or is gone."""
+    write_case(tmp_path, SHORT)
+    (tmp_path / "study.yml").write_text('{"base": "case.yml", "parameters": {"tow.speed": [0.1, 0.2]}}')
+    path = tmp_path / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    kind(path)
+    words = WRITTEN[name]
+    for force in ([], ["--force"])[:2 if words[0] != "ensemble" else 1]:
+        result = call(*words, *force, cwd=tmp_path, timeout=60)
+        assert result.returncode == IO and f"{path.name}: " in result.stderr and "regular file" in result.stderr, (
+            result.returncode, result.stderr)
+        assert os.readlink(path) == "/dev/null" if kind is link_to_a_device else path.is_fifo()
+
+
+def test_standard_output_is_no_place_for_a_file(tmp_path):
+    """A link of the system's, which root could replace."""
+    with open(tmp_path / "taken.h5", "wb") as file:
+        result = subprocess.run([BERGTOW, "field", write_case(tmp_path, SHORT), "-o", "/dev/stdout", "--force"],
+                                stdout=file, stderr=subprocess.PIPE, text=True, env=environment())
+    assert result.returncode == IO and "/dev/stdout: is an open descriptor and no regular file" in result.stderr
+    assert os.path.islink("/dev/stdout")
+
+
+def test_an_empty_file_is_replaced(tmp_path):
+    """As mktemp leaves it."""
+    (tmp_path / "field.h5").touch()
+    assert call("field", write_case(tmp_path, SHORT), "-o", tmp_path / "field.h5").returncode == DONE
+    assert (tmp_path / "field.h5").stat().st_size > 0

@@ -190,7 +190,7 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     (["empty", "--max-wall", "2 parsecs"], USAGE, "--max-wall 2 parsecs"),
     (["empty", "--max-wall", "0"], USAGE, "give a time of more than 0"),
     (["empty", "--stops"], USAGE, "did you mean --steps?"),
-    (["empty/notes.txt"], REFUSED, "empty/notes.txt: is cut off, or no file of this program"),
+    (["empty/notes.txt"], REFUSED, "empty/notes.txt: is no checkpoint file of this program"),
     (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, and a checkpoint file is needed here"),
 ])
 def test_what_cannot_be_resumed(tmp_path, arguments, code, text):
@@ -240,6 +240,42 @@ def test_a_missing_and_a_cut_checkpoint(stopped):
     path.unlink()
     assert "the last checkpoint is missing; out/checkpoint.previous.h5 is taken" in resumed(folder, "out")
     assert_same_result(whole, folder / "out")
+
+
+def opened_to_change_it(path):
+    with h5py.File(path, "r+"):
+        pass
+
+
+def of_an_earlier_format(path):
+    seal = b"bergtow sealed file\nkind: checkpoint 2\nbytes: 9\n"
+    path.write_bytes(seal.ljust(512, b"\0") + path.read_bytes()[:-128])
+
+
+ENDS = {
+    "cut": (lambda path: os.truncate(path, 5000), r"is cut off: 5000 of \d+ bytes"),
+    "cut in the seal": (lambda path: os.truncate(path, path.stat().st_size - 1), r"is cut off: \d+ of \d+ bytes"),
+    "cut before the seal": (lambda path: os.truncate(path, path.stat().st_size - 128), "has no seal at its end"),
+    "opened to change it": (opened_to_change_it, "has no seal at its end: .*another program has changed"),
+    "seal": (lambda path: flip(path, -60), "is damaged"),
+    "first word of the seal": (lambda path: flip(path, -128), "is damaged"),
+    "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
+    "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is no checkpoint file of this program"),
+    "empty": (lambda path: path.write_bytes(b""), "is no checkpoint file of this program"),
+    "earlier": (of_an_earlier_format, r'has the format "checkpoint 2", this program reads "checkpoint \d+"'),
+}
+
+
+def test_a_checkpoint_tells_how_it_ends(stopped):
+    folder, _ = stopped
+    path = folder / "out/checkpoint.h5"
+    sound = path.read_bytes()
+    (folder / "out/checkpoint.previous.h5").unlink()
+    for name, (damage, says) in ENDS.items():
+        path.write_bytes(sound)
+        damage(path)
+        error = resumed(folder, "out", code=REFUSED)
+        assert re.search(rf"checkpoint.h5: ({says})", error), (name, error)
 
 
 def test_a_damaged_result_is_not_continued(stopped):

@@ -292,3 +292,14 @@ def test_a_reader_that_has_gone(tmp_path, gone):
     assert result.returncode == (IO if gone == "stdout" else DONE)
     assert gone == "stderr" or "standard output: cannot be written" in result.stderr
     assert Run(tmp_path / "out", result).summary["n_steps"] == 300 and (tmp_path / "out/checkpoint.h5").exists()
+
+
+def test_a_field_for_a_reader_that_has_gone(tmp_path):
+    """Red when SIGPIPE ends the command: the file is there and the code is that of a signal."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = subprocess.run([BERGTOW, "field", write_case(tmp_path, TOW), "-o", tmp_path / "field.h5"], text=True,
+                            env=environment(OMP_NUM_THREADS=1), stdout=writer, stderr=subprocess.PIPE, timeout=30)
+    os.close(writer)
+    assert result.returncode == IO and "standard output: cannot be written" in result.stderr
+    assert (tmp_path / "field.h5").exists()

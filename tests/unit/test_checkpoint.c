@@ -424,7 +424,7 @@ static void damage_is_refused(void **state)
     for (int k = 0; k < 1100; k++) {
         x ^= x << 13, x ^= x >> 7, x ^= x << 17;
         // A fifth of them in the checksum and the first metadata, which are few bytes.
-        const size_t at = k % 5 ? x % n : x % 1024;
+        const size_t at = k % 5 ? x % n : k % 2 ? x % 1024 : n - 1 - x % BT_CHECKSUM_BYTES;
         const char bit = (char)(1 << (x >> 40) % 8);
         bytes[at] ^= bit;
         spill(path, bytes, k < 1000 ? n : at);
@@ -442,7 +442,7 @@ static void damage_is_refused(void **state)
     assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
     assert_non_null(
         strstr(err.text[0],
-               "has the format \"checkpoint 1\", this program reads \"checkpoint 2\"; use the program that wrote it"));
+               "has the format \"checkpoint 1\", this program reads \"checkpoint 3\"; use the program that wrote it"));
     bt_errors_free(&err);
     // Two files of one length, the front of one on the back of the other.
     bt_world_step(w);
@@ -452,9 +452,12 @@ static void damage_is_refused(void **state)
     size_t m;
     char *other = slurp(path, &m);
     assert_int_equal(m, n);
-    size_t last = n - 1;
+    size_t last = n - BT_CHECKSUM_BYTES - 1;
     while (other[last] == bytes[last]) last--;
     memcpy(other, bytes, last); // the last byte in which they differ stays
+    spill(path, other, m);
+    refused(path, m);
+    memcpy(other, bytes, n - BT_CHECKSUM_BYTES); // under the seal of the other
     spill(path, other, m);
     refused(path, m);
     free(other);

@@ -61,7 +61,7 @@ int fsync(int fd)
 static bt_status make(const char *path, bt_errors *err)
 {
     bt_h5 h = {0};
-    if (bt_h5_create_with_room(&h, path, err) != BT_OK) return BT_ERR_IO;
+    if (bt_h5_create(&h, path, err) != BT_OK) return BT_ERR_IO;
     const hid_t d = bt_h5_growing(&h, "/series", H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){8, 1}, false);
     for (int n = 0; n < 6; n++) {
         const double row[4] = {n, n + 1, n + 2, n + 3};
@@ -190,30 +190,36 @@ static void a_file_with_fewer_bytes_than_its_size(void **state)
     bt_errors_free(&err);
 }
 
-/// Zeros in the room in front, and behind them nothing, zeros, or HDF5: ours, cut off before it was complete. Anything
-/// else is somebody else's.
+/// Nothing, zeros, or HDF5: what a file of ours is before its seal. A seal is found at the end, that of
+/// an earlier format at the front; anything else is somebody else's.
 static void what_was_cut_off_early_is_ours(void **state)
 {
     (void)state;
+    static const char seal[] = "bergtow sealed file\nkind: field 9\n", hdf5[] = "\x89HDF\r\n\x1a\n";
     const struct {
         const char *name;
         size_t bytes;
-        const char *behind;
-        bool ours;
-    } files[] = {{"nothing", 0, "", true},
-                 {"a part of the room", 100, "", true},
-                 {"the room", 512, "", true},
-                 {"zeros", 600, "", true},
-                 {"HDF5", 600, "\x89HDF\r\n\x1a\n", true},
-                 {"a stranger", 600, "words", false}};
+        const char *front, *back;
+        bool to_come, sealed;
+    } files[] = {{"nothing", 0, "", "", true, false},
+                 {"a few zeros", 5, "", "", true, false},
+                 {"zeros", 600, "", "", true, false},
+                 {"HDF5", 600, hdf5, "", true, false},
+                 {"HDF5 under a seal", 600, hdf5, seal, true, true},
+                 {"a seal alone", BT_CHECKSUM_BYTES, "", seal, false, true},
+                 {"an earlier format", 600, seal, "", false, true},
+                 {"a stranger", 600, "words", "", false, false}};
     for (size_t k = 0; k < sizeof files / sizeof *files; k++) {
         char bytes[600] = {0}, path[] = "/tmp/bergtow-cut-XXXXXX";
-        memcpy(bytes + BT_CHECKSUM_BYTES, files[k].behind, strlen(files[k].behind));
+        memcpy(bytes, files[k].front, strlen(files[k].front));
+        if (*files[k].back) memcpy(bytes + files[k].bytes - BT_CHECKSUM_BYTES, files[k].back, strlen(files[k].back));
         const int fd = mkstemp(path);
         assert_int_equal(write(fd, bytes, files[k].bytes), files[k].bytes);
         close(fd);
-        if (bt_checksum_there(path, NULL) != files[k].ours) fail_msg("%s", files[k].name);
-        assert_false(bt_checksum_there(path, BT_CHECKSUM_FIELD));
+        if (bt_checksum_to_come(path) != files[k].to_come || bt_checksum_there(path, "") != files[k].sealed ||
+            bt_checksum_there(path, BT_CHECKSUM_FIELD) != files[k].sealed)
+            fail_msg("%s", files[k].name);
+        assert_false(bt_checksum_there(path, BT_CHECKSUM_RESULT));
         unlink(path);
     }
 }

@@ -51,7 +51,7 @@ static long write_file(const char *path, long die_after)
 {
     bt_errors err = {0};
     bt_h5 h = {0};
-    bt_h5_create_with_room(&h, path, &err);
+    bt_h5_create(&h, path, &err);
     hid_t series[SERIES];
     char name[32];
     for (int k = 0; k < SERIES; k++) {

@@ -278,9 +278,7 @@ static void add_numbers(hid_t file, const char *name, int rank, const hsize_t *s
 static void write_make(const char *path, int make)
 {
     bt_errors err = {0};
-    const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-    H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
-    const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
+    const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     assert_true(file >= 0);
     H5Gclose(H5Gcreate2(file, "/a", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
     switch (make) {
@@ -292,7 +290,6 @@ static void write_make(const char *path, int make)
     case WIDE: add_numbers(file, "/a/b", 2, (hsize_t[]){1, (hsize_t)1 << 40}); break;
     }
     H5Fclose(file);
-    H5Pclose(creation);
     must(bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, &err), &err);
 }
 
@@ -347,12 +344,9 @@ static void rows_of_another_width_are_refused(void **state)
     double *x = calloc(60, sizeof *x);
     for (size_t k = 0; k < sizeof reads / sizeof *reads; k++) {
         bt_errors err = {0};
-        const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-        H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
-        const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
+        const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
         add_numbers(file, "/x", 3, (hsize_t[]){3, 4, 5});
         H5Fclose(file);
-        H5Pclose(creation);
         must(bt_checksum_write(path, BT_CHECKSUM_RESULT, &err), &err);
         bt_h5_reader r;
         must(bt_h5_open(&r, path, BT_CHECKSUM_RESULT, &err), &err);
