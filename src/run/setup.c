@@ -16,6 +16,8 @@
 #include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
+#include "geometry/weld.h"
+#include "space/shore.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
@@ -105,18 +107,65 @@ static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roste
     }
 }
 
-static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+/// Turn the outline by yaw and move it to (x, y), or back.
+static void carry(int n, double *v, double x, double y, double yaw, bool back)
 {
+    double s, c;
+    bt_sincos(back ? -yaw : yaw, &s, &c);
+    for (int k = 0; k < n; k++) {
+        const double px = v[2 * k] - (back ? x : 0), py = v[2 * k + 1] - (back ? y : 0);
+        v[2 * k] = c * px - s * py + (back ? 0 : x);
+        v[2 * k + 1] = s * px + c * py + (back ? 0 : y);
+    }
+}
+
+/// Outlines of the floes by hand [n_floes], about their places: those of fixed ones that lie flush have common
+/// vertices.
+static bt_welded *outlines_by_hand(const bt_case *c, const bt_world *w)
+{
+    bt_welded *all = bt_alloc((size_t)c->n_floes, sizeof *all), *fixed = bt_alloc((size_t)c->n_floes, sizeof *fixed);
+    int n_fixed = 0;
     for (bt_idx i = 0; i < c->n_floes; i++) {
         const bt_floe_def *g = &c->floes[i];
-        double v[2 * BT_MAX_VERTICES];
-        int n = bt_case_floe_outline(g, v);
+        all[i].n = bt_case_floe_outline(g, all[i].v);
+        if (!g->fixed) continue;
+        fixed[n_fixed] = all[i];
+        carry(all[i].n, fixed[n_fixed++].v, g->x, g->y, g->yaw, false);
+    }
+    bt_welded *moved = bt_alloc((size_t)n_fixed, sizeof *moved);
+    memcpy(moved, fixed, (size_t)n_fixed * sizeof *moved);
+    bt_weld(n_fixed, moved, w->par.slop, w->par.period_x, w->par.period_y);
+    for (bt_idx i = 0, k = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        if (!g->fixed) continue;
+        if (memcmp(moved[k].v, fixed[k].v, 2 * (size_t)moved[k].n * sizeof *moved[k].v)) {
+            all[i] = moved[k];
+            carry(all[i].n, all[i].v, g->x, g->y, g->yaw, true);
+        }
+        k++;
+    }
+    free(fixed);
+    free(moved);
+    return all;
+}
+
+static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    bt_welded *outline = outlines_by_hand(c, w);
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        const double *v = outline[i].v;
+        const int n = outline[i].n;
         bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
                          .vx = bt_case_start(g->vx), .vy = bt_case_start(g->vy), .yaw_rate = g->yaw_rate};
         floe_def(c, n, v, g->thickness, &d);
+        bt_parts parts;
+        if (!bt_outline_convex(n, v) && bt_outline_split(n, v, &parts)) d.parts = &parts;
         d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = g->thickness;
     }
+    free(outline);
+    bt_shore_create(w);
 }
 
 static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
