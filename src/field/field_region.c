@@ -60,7 +60,7 @@ double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const doub
     return sum;
 }
 
-// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so
+// Add a convex body and its periodic images that reach into the region; the ice loses what they cover. False for a body so
 // slender that room for the clearance cannot be made by scaling: it would keep floes away all along its line, and its
 // images would be without number.
 static bool add_obstacle(bt_region *y, int n, const double *v)
@@ -114,7 +114,16 @@ static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, d
             double v[2 * BT_MAX_VERTICES];
             memcpy(v, own, 2 * (size_t)n * sizeof *v);
             place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
-            if (!add_obstacle(y, n, v)) return false;
+            bt_parts p;
+            if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &p)) {
+                if (!add_obstacle(y, n, v)) return false;
+                continue;
+            }
+            for (int i = 0, at = 0; i < p.n; at += p.count[i++]) {
+                double part[2 * BT_MAX_VERTICES];
+                for (int k = 0; k < p.count[i]; k++) memcpy(part + 2 * k, v + 2 * p.corner[at + k], 2 * sizeof *v);
+                if (!add_obstacle(y, p.count[i], part)) return false;
+            }
         }
     return true;
 }
