@@ -5,7 +5,8 @@
 // normals of the two then differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it
 // stops a floe that slides, and with friction the sweeps find no solution at all (seen: a hexagon in two parts, 20,000
 // sweeps, 18 J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to
-// different shores, as in a notch, and stay.
+// different sides, as in a notch, and stay. Of two points at one place the deeper one stays: the other may be the end of
+// an edge that is cut off at the seam, and above the corner that lies just beyond it.
 #include "contact/merge.h"
 
 #include <math.h>
@@ -37,36 +38,43 @@ static bool same_place(const touch *p, int i, const touch *q, int j, double reac
     return fabs(p->m->nx * dy - p->m->ny * dx) <= reach; // along the surface: their heights differ by half of the gaps
 }
 
-static bool shares(const touch *p, int i, const touch *q, double reach)
+static void drop(bt_manifold *m, int i)
 {
-    for (int j = 0; j < q->m->n_points; j++)
-        if (same_place(p, i, q, j, reach)) return true;
-    return false;
+    if (i + 1 < m->n_points) m->p[i] = m->p[i + 1];
+    m->n_points--;
 }
 
-/// Take the points out of p that q has, too.
-static void take_out(const bt_bodies *b, const touch *p, const touch *q)
+/// Points that p and q have both: those of q stay, unless that of p is deeper by more than the slop.
+static void settle(const bt_world *w, const touch *p, const touch *q)
 {
-    const bt_manifold *m = p->m, *o = q->m;
+    const bt_bodies *b = &w->bodies;
+    bt_manifold *m = p->m, *o = q->m;
     const double reach = PLACE * bt_min(bt_min(b->radius[m->a], b->radius[m->b]),
-                                        bt_min(b->radius[o->a], b->radius[o->b]));
-    int kept = 0;
-    for (int i = 0; i < m->n_points; i++)
-        if (!shares(p, i, q, reach)) p->m->p[kept++] = p->m->p[i];
-    p->m->n_points = kept;
+                                        bt_min(b->radius[o->a], b->radius[o->b])),
+                 deeper = w->par.slop;
+    for (int i = m->n_points - 1; i >= 0; i--)
+        for (int j = o->n_points - 1; j >= 0; j--) {
+            if (!same_place(p, i, q, j, reach)) continue;
+            if (m->p[i].gap < o->p[j].gap - deeper) {
+                drop(o, j);
+            } else {
+                drop(m, i);
+                break;
+            }
+        }
 }
 
 /// The contacts t[n] of one body with the polygons of one outline.
-static void merge(const bt_bodies *b, const touch *t, size_t n)
+static void merge(const bt_world *w, const touch *t, size_t n)
 {
     // Edges that lie on each other know more than single points: those go first, whatever their order.
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             if (i != j && t[i].m->n_points == 1 && (t[j].m->n_points == 2 || (t[j].m->n_points == 1 && j < i)))
-                take_out(b, &t[i], &t[j]);
+                settle(w, &t[i], &t[j]);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < i; j++)
-            if (t[i].n_points == 2 && t[j].n_points == 2) take_out(b, &t[i], &t[j]);
+            if (t[i].n_points == 2 && t[j].n_points == 2) settle(w, &t[i], &t[j]);
 }
 
 static int by_body(const void *p, const void *q)
@@ -90,12 +98,12 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
         touch *of_pair = t + on_shore; // until the next one comes
         for (; end < n && man[end].a == man[k].a && man[end].b == man[k].b; end++) {}
         for (size_t i = k; i < end; i++) of_pair[i - k] = (touch){.m = &man[i], .n_points = man[i].n_points};
-        if (end > k + 1) merge(b, of_pair, end - k);
+        if (end > k + 1) merge(w, of_pair, end - k);
     }
     if (on_shore > 0) qsort(t, on_shore, sizeof *t, by_body);
     for (size_t k = 0, end; k < on_shore; k = end) {
         for (end = k + 1; end < on_shore && t[end].body == t[k].body; end++) {}
-        if (end > k + 1) merge(b, t + k, end - k);
+        if (end > k + 1) merge(w, t + k, end - k);
     }
     free(t);
 }
