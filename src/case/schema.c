@@ -481,7 +481,8 @@ const bt_key bt_floe_keys[] = {
      AT(vertices),
      .offset_count = offsetof(bt_floe_def, n_vertices),
      .doc =
-         "corners of shape polygon, anticlockwise: [[x, y], ...], convex or not; moved so that the centroid is the origin"},
+         "corners of shape polygon, convex or not, anticlockwise: [[x, y], ...]; moved so that the centroid is the "
+         "origin"},
     REAL("x", x, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("y", y, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("yaw", yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the floe's own x from the x axis towards y"),

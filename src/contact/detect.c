@@ -16,6 +16,7 @@
 #include "contact/pack.h"
 #include "space/pairs.h"
 #include "space/phases.h"
+#include "space/shore.h"
 
 /// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
@@ -202,8 +203,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
             continue;
         }
         bt_pack_keep(&s->pack);
-        several = several || p->part[0] || p->part[1] || bt_shore_has(w->shore, b->gid[p->a]) ||
-                  bt_shore_has(w->shore, b->gid[p->b]);
+        several = several || p->part[0] || p->part[1] || bt_shore_holds(w, p->a) || bt_shore_holds(w, p->b);
     }
     if (several) merge(w, t, &s->pack);
     if (t->laws.n_memory > 0) replace(w, t, &s->pack);

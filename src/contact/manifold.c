@@ -456,7 +456,7 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
                        int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out)
 {
     const bool convex = part[0] == 0 && part[1] == 0;
-    if (convex && !(w->shore && (bt_shore_has(w->shore, w->bodies.gid[ia]) || bt_shore_has(w->shore, w->bodies.gid[ib]))))
+    if (convex && !bt_shore_holds(w, ia) && !bt_shore_holds(w, ib))
         return bodies_touch(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
     bt_bodies_offset(w, ia, ib, d);

@@ -5,8 +5,8 @@
 // normals of the two then differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it
 // stops a floe that slides, and with friction the sweeps find no solution at all (seen: a hexagon in two parts, 20,000
 // sweeps, 18 J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to
-// different sides, as in a notch, and stay. Of two points at one place the deeper one stays: the other may be the end of
-// an edge that is cut off at the seam, and above the corner that lies just beyond it.
+// different sides, as in a notch, and stay. Of two points at one place the deeper one stays: the other may be the end
+// of an edge that is cut off at the seam, and above the corner that lies just beyond it.
 #include "contact/merge.h"
 
 #include <math.h>
@@ -89,7 +89,7 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
     touch *t = bt_alloc(n, sizeof *t);
     size_t on_shore = 0;
     for (size_t k = 0, end; k < n; k = end) {
-        const bool shore_a = bt_shore_has(w->shore, b->gid[man[k].a]), shore_b = bt_shore_has(w->shore, b->gid[man[k].b]);
+        const bool shore_a = bt_shore_holds(w, man[k].a), shore_b = bt_shore_holds(w, man[k].b);
         end = k + 1;
         if (shore_a || shore_b) {
             t[on_shore++] = (touch){&man[k], b->gid[shore_a ? man[k].b : man[k].a], k, man[k].n_points, shore_a};

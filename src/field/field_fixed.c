@@ -20,7 +20,8 @@ bt_status bt_field_write_fixed(const bt_field *f, const bt_case *c, const char *
     fprintf(out, HEAD BT_VERSION "\n# x and y in metres of the frame %s\ndomain: {frame: %s}\nfloes:\n", frame, frame);
     for (bt_idx i = 0; i < f->n; i++) {
         const double *p = f->pose + 3 * (size_t)i;
-        fprintf(out, "  - {shape: polygon, fixed: true, x: %.17g, y: %.17g, yaw: %.17g rad, thickness: %.17g, vertices: [",
+        fprintf(out,
+                "  - {shape: polygon, fixed: true, x: %.17g, y: %.17g, yaw: %.17g rad, thickness: %.17g, vertices: [",
                 p[0], p[1], p[2], f->thickness[i]);
         for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
             fprintf(out, "%s[%.17g, %.17g]", k > f->offsets[i] ? ", " : "", f->vertices[2 * k], f->vertices[2 * k + 1]);

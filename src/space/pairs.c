@@ -221,7 +221,7 @@ static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, doub
     between(w, s, own, diagonal, clearance, &n);
     between(w, s, right, above, clearance, &n);
     for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
-        if (b->motion[l] == BT_DYNAMIC || bt_shore_has(w->shore, b->gid[l])) continue;
+        if (b->motion[l] == BT_DYNAMIC || bt_shore_holds(w, l)) continue;
         double box[N_BOX];
         box_of(b, l, box);
         for (size_t i = own.begin; i < own.end; i++)
@@ -270,12 +270,12 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
     for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
-        if (bt_shore_has(w->shore, b->gid[l])) continue;
+        if (bt_shore_holds(w, l)) continue;
         double box[N_BOX];
         box_of(b, l, box);
         append_shore(w, s, &n, l, box, clearance_large);
         for (bt_idx o = l + 1; o < b->n; o++) {
-            if (bt_shore_has(w->shore, b->gid[o])) continue;
+            if (bt_shore_holds(w, o)) continue;
             double other[N_BOX];
             box_of(b, o, other);
             if (near(&w->par, box, other, clearance_large)) append(w, s, &n, l, o, clearance_large);

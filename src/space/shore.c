@@ -117,8 +117,8 @@ static void take_nearest(void *context, const bt_shore_polygon *p)
 {
     const nearest *c = context;
     const double dx = p->x - c->x, dy = p->y - c->y;
-    if (bt_nearest_image(dx, c->period[0]) != dx + c->shift[0] || bt_nearest_image(dy, c->period[1]) != dy + c->shift[1])
-        return;
+    if (bt_nearest_image(dx, c->period[0]) != dx + c->shift[0]) return;
+    if (bt_nearest_image(dy, c->period[1]) != dy + c->shift[1]) return;
     bt_shore_list *l = c->list;
     if (l->n == l->cap) l->found = bt_realloc(l->found, l->cap = l->cap ? 2 * l->cap : 64, sizeof *l->found);
     l->found[l->n++] = *p;

@@ -27,7 +27,7 @@
 /// What of one vertex of a polygon, and of the edge that starts there, is on the boundary of the shore.
 typedef struct bt_face {
     double from, to;   ///< the edge counts from here to here, m from its vertex; from >= to: it does not
-    double u[2], w[2]; ///< unit normals that bound the cone, anticlockwise from u to w; both 0: the corner counts nowhere
+    double u[2], w[2]; ///< unit normals that bound the cone, anticlockwise from u to w; both 0: it counts nowhere
 } bt_face;
 
 typedef struct bt_shore bt_shore;
@@ -39,6 +39,11 @@ void bt_shore_free(bt_shore *s);
 
 /// Is body gid part of a shore?
 bool bt_shore_has(const bt_shore *s, bt_gid gid);
+/// The same of the body with index i.
+static inline bool bt_shore_holds(const bt_world *w, bt_idx i)
+{
+    return w->shore && bt_shore_has(w->shore, w->bodies.gid[i]);
+}
 /// Faces of the polygon of body gid that starts at its vertex `part`; NULL: the body is part of no shore.
 const bt_face *bt_shore_faces(const bt_shore *s, bt_gid gid, int part);
 /// Does the corner of a face count in the direction of the unit vector n?
