@@ -327,7 +327,7 @@ MUTANTS = {
         ("if (again && cell->active && margin <= cell->margin) continue;", "if (again && cell->active) continue;",
          "again"),
         ("t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);", ";", "no overlap is seen"),
-        ("if (parts) merge(w, t, &s->pack);", "", "points of two parts count twice"),
+        ("if (several) merge(w, t, &s->pack);", "", "points of two parts count twice"),
         ("bt_domain_maxima(w, &any, 1);\n    return any > 0;", "return any > 0;", "ranks disagree on a repeat"),
         ("if (w->bodies.disturbed[i]) s = bt_max(s, stir);", "", "a shifted floe outruns its margin"),
         ("2 * w->par.dt * t->bound[k] > bt_margin_most(w)", "2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w)",

@@ -55,6 +55,12 @@ GEO = {
 }
 SQUARES = [{"shape": "square", "length": 0.8, "x": 6 + 0.95 * (k % 6), "y": -2 + 0.95 * (k // 6), "yaw": k % 5,
             "thickness": 0.03 + 0.001 * k} for k in range(24)]
+#: three flush pieces fill a period, one of them not convex, and a pier stands in the last
+COAST = [{"shape": "polygon", "x": 6, "y": -4, "fixed": True,
+          "vertices": [[-6, -0.9], [6, -0.9], [6, 0.4], [1, 1.1], [0, 0.5], [-1, 1], [-6, 0.4]]},
+         {"shape": "polygon", "x": 15, "y": -4.2, "fixed": True, "vertices": [[-3, -0.9], [3, -0.9], [3, 0.9], [-3, 0.6]]},
+         {"shape": "rectangle", "length": 6, "width": 1.5, "x": 21, "y": -4.25, "fixed": True},
+         {"shape": "square", "length": 1, "x": 21, "y": -3.2, "yaw": 20, "fixed": True}]
 SHAPES = [{"shape": "disc", "length": 1.1, "x": 5.5, "y": 0.1, "yaw": 50, "vx": -0.37, "vy": -0.11, "yaw_rate": 7},
           {"shape": "polygon", "vertices": [[0, 0], [1.7, 0], [1, 1.3]], "x": 7, "y": 0.3, "yaw": 31},
           {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 8.6, "y": 0, "yaw": 80, "vx": -0.5, "vy": 0},
@@ -158,6 +164,9 @@ SCENES = {
     "floes_of_each_shape": changed(SHORT, ice__concentration=0, floes=SHAPES, tow__speed=0.6),
     "one_fixed_floe": changed(SHORT, ice__concentration=0.3, floes=[{"shape": "disc", "length": 2, "x": 10, "y": 1,
                                                                    "fixed": True, "thickness": 0.1}], tow__speed=1),
+    "coast": changed(LINE, domain={"length": 24, "width": 10, "ends": "periodic"}, floes=COAST, body__y=0.5,
+                     run__duration=8, water={"current_x": 0.1, "current_y": -0.25}, ice__crushing={"pressure": 2e3},
+                     ice__rafting={"kappa": 11}),
     "heavy_body_against_wall": changed(LINE, body__x=10, body__mass=2e4, tow__speed=0.5, tow__ramp=0.2,
                                        ice__concentration=0.6),
     "body_in_parts_outlines": changed(SHORT, ice={"friction": 0.3, "outlines": "bays.geojson", "nonconvex": "split"}),

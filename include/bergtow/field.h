@@ -91,6 +91,13 @@ bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
 /// are local. A complete file or none. Errors: BT_ERR_IO.
 bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 
+/// Outlines where they lie, as a list of fixed floes (`floes:`) that a case reads with `base:`. A complete file or
+/// none. Errors: BT_ERR_IO.
+bt_status bt_field_write_fixed(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
+
+/// Has bt_field_write_fixed written this file?
+bool bt_field_fixed_ours(const char *path);
+
 /// Has bt_field_write_outlines written this file?
 bool bt_field_outlines_ours(const char *path);
 

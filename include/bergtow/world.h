@@ -221,6 +221,7 @@ typedef struct bt_world {
     struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
+    struct bt_shore *shore;  ///< fixed bodies that lie against each other (space/shore.h), NULL = none
     struct bt_impacts *impacts; ///< loads of the towed body by collisions and without (impact.h), NULL = as a whole
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with
-// ice.outlines.
+// ice.outlines; or as fixed floes, with base.
 #include "bergtow/field.h"
 #include "case/case_check.h"
 #include "app/cmd.h"
@@ -29,7 +29,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case KEY_FORCE: o->force = true; return 0;
     case ARGP_KEY_END:
         if (!o->output || !*o->output)
-            argp_error(state, "no output file given; name one with -o FIELD.h5 or FIELD.geojson");
+            argp_error(state, "no output file given; name one with -o FIELD.h5, FIELD.geojson or COAST.yml");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -38,7 +38,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 static const struct argp_option field_options[] = {
     {"output", 'o', "FILE", 0,
      "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where "
-     "the field is, otherwise metres east and north",
+     "the field is, otherwise metres east and north; or fixed floes, as a coast from a map (COAST.yml)",
      0},
     {"force", KEY_FORCE, NULL, 0, "replace a file of that name, whatever it is", 0},
     {0},
@@ -49,12 +49,13 @@ static const struct argp field_argp = {.options = field_options,
                                        .args_doc = "CASE.yml",
                                        .children = children,
                                        .doc = "Make the ice field of a case, or read it from its ice.outlines, and "
-                                              "write it; another case reads it with ice.field or ice.outlines."};
+                                              "write it; another case reads it with ice.field or ice.outlines, or "
+                                              "has it as fixed floes with base."};
 
-static bool is_geojson(const char *path)
+static bool ends_in(const char *path, const char *one, const char *other)
 {
     const char *dot = strrchr(path, '.');
-    return dot && (!strcasecmp(dot, ".geojson") || !strcasecmp(dot, ".json"));
+    return dot && (!strcasecmp(dot, one) || !strcasecmp(dot, other));
 }
 
 int bt_cmd_field(int argc, char **argv)
@@ -67,8 +68,8 @@ int bt_cmd_field(int argc, char **argv)
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     // A field that is read and written in the same form is the file there is.
-    const bool outlines = is_geojson(o.output);
-    if (status == BT_OK && c.ice.field && !outlines) {
+    const bool outlines = ends_in(o.output, ".geojson", ".json"), fixed = ends_in(o.output, ".yml", ".yaml");
+    if (status == BT_OK && c.ice.field && !outlines && !fixed) {
         bt_errors_add(&err,
                       "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "
                       "with -o FIELD.geojson",
@@ -76,13 +77,17 @@ int bt_cmd_field(int argc, char **argv)
         status = BT_ERR_CASE;
     }
     const bool ours =
-        outlines ? bt_field_outlines_ours(o.output) : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
+        outlines ? bt_field_outlines_ours(o.output)
+        : fixed  ? bt_field_fixed_ours(o.output)
+                 : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
     if (status == BT_OK) status = bt_cmd_may_write(o.output, o.file.path, ours, o.force, &err);
     double start = bt_clock();
     if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK)
-        status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
+        status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err)
+                 : fixed  ? bt_field_write_fixed(&f, &c, o.output, &err)
+                          : bt_field_write(&f, &c, o.output, &err);
     bt_errors warnings = {0};
     if (status == BT_OK) {
         const double took = bt_clock() - start;

@@ -490,7 +490,7 @@ static void check_floe(const check *k, int index)
     if (k->err->n > before) return;
     double v[2 * BT_MAX_VERTICES];
     const char *why = NULL;
-    int n = bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, &why);
+    int n = bt_case_floe_admit(f, v, &why);
     if (why) {
         bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
         return;

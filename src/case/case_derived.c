@@ -9,24 +9,47 @@
 #include "base/table.h"
 #include "case/body_shapes.h"
 #include "case/size_law.h"
-#include "bergtow/shape.h"
+#include "bergtow/outline.h"
 
 double bt_case_tow_sign(const bt_case *c) { return bt_cos(c->tow.direction) < 0 ? -1 : 1; }
 
-int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
-                    const char **why)
+/// fault: why an outline is refused, or NULL.
+static int outline_of(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
+                      const char *(*fault)(int n, const double *v), const char **why)
 {
     if (shape == BT_BODY_ABSENT) return 0;
     if (shape != BT_BODY_POLYGON)
         n = bt_body_shape_named(shape, length, width, v);
     else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
     else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
-    const char *reason = bt_shape_fault(n, v);
+    const char *reason = fault(n, v);
     if (why) *why = reason;
     if (reason) return 0;
     bt_shape_centre(n, v);
     return n;
 }
+
+int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
+                    const char **why)
+{
+    return outline_of(shape, length, width, n, vertices, v, bt_shape_fault, why);
+}
+
+/// Of a floe, which need not be convex.
+static const char *floe_fault(int n, const double *v)
+{
+    bt_parts parts;
+    const char *why = bt_outline_fault(n, v);
+    if (why || bt_outline_convex(n, v) || bt_outline_split(n, v, &parts)) return why;
+    return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
+}
+
+int bt_case_floe_admit(const bt_floe_def *f, double *v, const char **why)
+{
+    return outline_of(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, floe_fault, why);
+}
+
+int bt_case_floe_outline(const bt_floe_def *f, double *v) { return bt_case_floe_admit(f, v, NULL); }
 
 int bt_case_waterline(const bt_case *c, double *v)
 {
@@ -40,11 +63,6 @@ double bt_case_body_length(const bt_case *c, double angle)
     const int n = bt_case_waterline(c, v);
     const double along = angle - c->body.yaw;
     return n ? bt_shape_width(n, v, -bt_sin(along), bt_cos(along)) : 0;
-}
-
-int bt_case_floe_outline(const bt_floe_def *f, double *v)
-{
-    return bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
 }
 
 double bt_case_size_moment(const bt_case *c, int k)

@@ -10,6 +10,9 @@
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                     const char **why);
 
+/// The same of a floe by hand, which need not be convex if it can be cut into convex parts.
+int bt_case_floe_admit(const bt_floe_def *f, double *v, const char **why);
+
 /// Length of the body: of a named shape body.length, of a polygon its extent in the direction at this angle from x, m.
 double bt_case_body_length(const bt_case *c, double angle);
 

@@ -497,7 +497,8 @@ const bt_key bt_floe_keys[] = {
      AT(vertices),
      .offset_count = offsetof(bt_floe_def, n_vertices),
      .doc =
-         "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
+         "corners of shape polygon, convex or not, anticlockwise: [[x, y], ...]; moved so that the centroid is the "
+         "origin"},
     REAL("x", x, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("y", y, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("yaw", yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the floe's own x from the x axis towards y"),
@@ -507,7 +508,8 @@ const bt_key bt_floe_keys[] = {
     REAL("yaw_rate", yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero"),
     REAL("thickness", thickness, LENGTH, "= ice.thickness", "(0, 100]", "thickness"),
     BOOL("fixed", fixed, "false",
-         "at rest for ever, as a structure or grounded ice; floes do not raft on it (ice.rafting.kappa)"),
+         "at rest for ever, as a structure, a coast or grounded ice; floes do not raft on it (ice.rafting.kappa), and "
+         "fixed floes that lie flush, or in each other, act as one outline"),
 };
 const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
 

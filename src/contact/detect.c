@@ -16,6 +16,7 @@
 #include "contact/pack.h"
 #include "space/pairs.h"
 #include "space/phases.h"
+#include "space/shore.h"
 
 /// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
@@ -130,7 +131,7 @@ typedef struct {
     bt_pack_scratch pack;
 } thread_scratch;
 
-/// Contacts that several parts of a floe have found are one.
+/// Contacts that several parts of a floe, or pieces of a shore, have found are one.
 static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
 {
     bt_merge_parts(w, s->man, s->n);
@@ -176,7 +177,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     if (t->laws.n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, 2 * (size_t)t->search.n_pairs); // a pair may have a second contact (replace)
-    bool parts = false;
+    bool several = false; // polygons of one outline
     const bool near = bt_pairs_near(w, k, t, t->margin);
     const double far = t->margin + bt_pairs_near_gap(w);
     for (bt_idx j = 0, n = near ? t->search.n_near : t->search.n_pairs; j < n; j++) {
@@ -202,9 +203,9 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
             continue;
         }
         bt_pack_keep(&s->pack);
-        parts = parts || p->part[0] || p->part[1];
+        several = several || p->part[0] || p->part[1] || bt_shore_holds(w, p->a) || bt_shore_holds(w, p->b);
     }
-    if (parts) merge(w, t, &s->pack);
+    if (several) merge(w, t, &s->pack);
     if (t->laws.n_memory > 0) replace(w, t, &s->pack);
     t->n_points = 0;
     t->overlap = 0;

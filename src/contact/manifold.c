@@ -15,6 +15,7 @@
 
 #include "contact/contacts.h"
 #include "space/cells.h"
+#include "space/shore.h"
 #include "base/elementary.h"
 
 typedef struct {
@@ -145,9 +146,10 @@ typedef struct { double margin, beside; } bounds;
 
 static bounds bounds_of(const bt_world *w, double margin) { return (bounds){margin, w->cells->beside}; }
 
-/// Points of the incident polygon that face reference edge i; `flip` when the reference is b.
-static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, bounds most,
-                        bt_manifold *m)
+/// Points of the incident polygon that face reference edge i, or what counts of it on a shore (shown, or NULL); `flip`
+/// when the reference is b.
+static void clip_points(const polygon *ref, int i, const bt_face *shown, const polygon *inc, bool flip, double dx,
+                        double dy, bounds most, bt_manifold *m)
 {
     double nx, ny;
     edge_normal(ref, i, &nx, &ny);
@@ -155,7 +157,7 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     double r[2], rn[2];
     world_vertex(ref, i, r);
     world_vertex(ref, i + 1 < ref->count ? i + 1 : 0, rn);
-    const double length = tx * (rn[0] - r[0]) + ty * (rn[1] - r[1]);
+    const double from = shown ? shown->from : 0, to = shown ? shown->to : tx * (rn[0] - r[0]) + ty * (rn[1] - r[1]);
 
     const int facing = facing_edge(inc, nx, ny);
     int other = facing + 1 < inc->count ? facing + 1 : 0;
@@ -175,15 +177,15 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     int n = 0, kept = 0;
     double depth = INFINITY;
     for (int k = 0; k < 2; k++) {
-        double t = ends[k].t, bound = k == 0 ? length : 0;
-        bool beyond = k == 0 ? t > length : t < 0;
+        double t = ends[k].t, bound = k == 0 ? to : from;
+        bool beyond = k == 0 ? t > to : t < from;
         if (beyond && span > 0) {
             double f = (bound - tq) / span; // position of the bound along the incident edge, from q
             if (f < 0 || f > 1) continue;   // the whole incident edge is beyond
             ends[k].t = bound;
             ends[k].gap = gq + f * (gp - gq);
             ends[k].id = (uint32_t)(k == 0 ? i + 1 : i) << 1 | 1u;
-        } else if (t < 0 || t > length) {
+        } else if (t < from || t > to) {
             continue;
         }
         depth = bt_min(depth, ends[k].gap);
@@ -310,7 +312,7 @@ static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, i
     *m = (bt_manifold){.a = a, .b = b};
     const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
     const bounds most = bounds_of(w, margin);
-    clip_points(ref, edge, inc, ref_b, d[0], d[1], most, m);
+    clip_points(ref, edge, NULL, inc, ref_b, d[0], d[1], most, m);
     if (!(sep > 0)) {
         if (m->n_points == 0) deepest_point(ref, edge, inc, ref_b, d[0], d[1], m);
         return true;
@@ -322,11 +324,11 @@ static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, i
     int ca = 0, cb = 0, e = 0;
     bool of_b = false;
     if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) return join_corners(&pa, ca, &pb, cb, d, margin, m);
-    clip_points(of_b ? &pb : &pa, e, of_b ? &pa : &pb, of_b, d[0], d[1], most, m);
+    clip_points(of_b ? &pb : &pa, e, NULL, of_b ? &pa : &pb, of_b, d[0], d[1], most, m);
     return m->n_points > 0;
 }
 
-// --- bodies that are not convex --------------------------------------------------------------------------------------
+// --- bodies that are not convex, and shores --------------------------------------------------------------------------
 //
 // The parts of such a body are convex, but some of their edges are cuts through the ice, and some of their corners are
 // no corners of the body. A contact there would be with something that is not there: a floe that slides along a shore
@@ -339,6 +341,9 @@ static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, i
 // that are apart touch at their nearest features or not at all. Parts that overlap part along the best axis that
 // counts, if that is not much farther than along the best of all: the middle one of three parts that share a corner
 // has edges of the outline only on its far side.
+//
+// Of a shore (space/shore.h) the pieces are such parts of one outline: their edges and corners count where they are on
+// the boundary of it.
 
 // rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
 #define CONE 1e-6
@@ -349,25 +354,30 @@ typedef struct {
     const bt_mark *mark;
     const double *outline; ///< of the body
     int corners;
-    bool whole;            ///< the body is convex: everything counts
+    const bt_face *face;   ///< of a shore: it says what counts
+    bool whole;            ///< the body is convex and alone: everything counts
 } part_of_body;
 
-static part_of_body part_of(const bt_bodies *b, bt_idx i, int part, double x, double y)
+static part_of_body part_of(const bt_world *w, bt_idx i, int part, double x, double y)
 {
+    const bt_bodies *b = &w->bodies;
     const int64_t first = b->offset[i];
+    const bt_face *face = bt_shore_faces(w->shore, b->gid[i], part);
     return (part_of_body){polygon_of(b, i, part, x, y), b->mark + first + part, b->outline + 2 * first,
-                          bt_body_corners(b, i), part == 0};
+                          bt_body_corners(b, i), face, part == 0 && !face};
 }
 
 static bool edge_counts(const part_of_body *q, int i)
 {
     const int next = i + 1 < q->p.count ? i + 1 : 0, after = q->mark[i].corner + 1;
+    if (q->face) return q->face[i].from < q->face[i].to;
     return q->whole || q->mark[next].corner == (after < q->corners ? after : 0);
 }
 
 static bool corner_counts(const part_of_body *q, int i, double nx, double ny)
 {
     if (q->whole) return true;
+    if (q->face) return bt_shore_in_cone(&q->face[i], nx, ny);
     const int here = q->mark[i].corner, before = here > 0 ? here - 1 : q->corners - 1,
               after = here + 1 < q->corners ? here + 1 : 0;
     const double *o = q->outline;
@@ -410,7 +420,7 @@ static double separation_that_counts(const part_of_body *p, const part_of_body *
 static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
                              bounds most, bt_manifold *m)
 {
-    clip_points(&ref->p, i, &inc->p, flip, d[0], d[1], most, m);
+    clip_points(&ref->p, i, ref->face ? &ref->face[i] : NULL, &inc->p, flip, d[0], d[1], most, m);
     double nx, ny;
     edge_normal(&ref->p, i, &nx, &ny);
     if (edge_counts(inc, facing_edge(&inc->p, nx, ny))) return;
@@ -445,10 +455,12 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
 bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out)
 {
-    if (part[0] == 0 && part[1] == 0) return bodies_touch(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
+    const bool convex = part[0] == 0 && part[1] == 0;
+    if (convex && !bt_shore_holds(w, ia) && !bt_shore_holds(w, ib))
+        return bodies_touch(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
     bt_bodies_offset(w, ia, ib, d);
-    const part_of_body a = part_of(&w->bodies, ia, part[0], 0, 0), b = part_of(&w->bodies, ib, part[1], d[0], d[1]);
+    const part_of_body a = part_of(w, ia, part[0], 0, 0), b = part_of(w, ib, part[1], d[0], d[1]);
     const double tie = tie_of(&w->bodies, ia, ib);
     // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the
     // last axis first.

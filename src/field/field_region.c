@@ -60,17 +60,43 @@ double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const doub
     return sum;
 }
 
-// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so
-// slender that room for the clearance cannot be made by scaling: it would keep floes away all along its line, and its
-// images would be without number.
-static bool add_obstacle(bt_region *y, int n, const double *v)
+/// Box about polygon v of n vertices along its longest edge, `clearance` beyond it on all sides.
+static void box_about(int n, const double *v, double clearance, double box[8])
+{
+    double longest = 0, ux = 1, uy = 0, low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
+        const double l = bt_hypot(q[0] - p[0], q[1] - p[1]);
+        if (l > longest) longest = l, ux = (q[0] - p[0]) / l, uy = (q[1] - p[1]) / l;
+    }
+    for (int i = 0; i < n; i++) {
+        const double at[2] = {ux * v[2 * i] + uy * v[2 * i + 1], ux * v[2 * i + 1] - uy * v[2 * i]};
+        for (int k = 0; k < 2; k++) low[k] = bt_min(low[k], at[k]), high[k] = bt_max(high[k], at[k]);
+    }
+    for (int k = 0; k < 2; k++) low[k] -= clearance, high[k] += clearance;
+    const double corner[8] = {low[0], low[1], high[0], low[1], high[0], high[1], low[0], high[1]};
+    for (int i = 0; i < 4; i++) {
+        box[2 * i] = ux * corner[2 * i] - uy * corner[2 * i + 1];
+        box[2 * i + 1] = uy * corner[2 * i] + ux * corner[2 * i + 1];
+    }
+}
+
+// Add a convex body, or a part of one, and its periodic images that reach into the region; the ice loses what they
+// cover. False for a body so slender that room for the clearance cannot be made by scaling: it would keep floes away all
+// along its line, and its images would be without number. A part so slender is a sliver along an edge, and gets a box.
+static bool add_obstacle(bt_region *y, int n, const double *v, bool part)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     bt_moments m = bt_shape_moments(n, v);
     // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
     double grow = 1 + y->clearance / bt_max(m.inradius, 1e-9 * m.radius);
-    if (grow > MOST_GROWTH) return false;
-    double r = m.radius * grow;
+    const bool sliver = grow > MOST_GROWTH;
+    if (sliver && !part) return false;
+    double box[8], r = m.radius * grow;
+    if (sliver) {
+        box_about(n, v, y->clearance, box);
+        r = bt_shape_extent(4, box).radius + m.radius;
+    }
     // A body far outside a periodic domain is brought back first, so that images next to it suffice.
     double wx = m.cx, wy = m.cy;
     bt_region_wrap(y, &wx, &wy);
@@ -91,9 +117,11 @@ static bool add_obstacle(bt_region *y, int n, const double *v)
                 o->v[2 * k + 1] = cy + (v[2 * k + 1] - m.cy);
             }
             y->ice_area -= area_inside(y, n, o->v);
-            for (int k = 0; k < n; k++) {
-                o->v[2 * k] = cx + grow * (v[2 * k] - m.cx);
-                o->v[2 * k + 1] = cy + grow * (v[2 * k + 1] - m.cy);
+            const double *outer = sliver ? box : v, by = sliver ? 1 : grow;
+            o->n = sliver ? 4 : n;
+            for (int k = 0; k < o->n; k++) {
+                o->v[2 * k] = cx + by * (outer[2 * k] - m.cx);
+                o->v[2 * k + 1] = cy + by * (outer[2 * k + 1] - m.cy);
             }
         }
     return true;
@@ -114,7 +142,16 @@ static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, d
             double v[2 * BT_MAX_VERTICES];
             memcpy(v, own, 2 * (size_t)n * sizeof *v);
             place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
-            if (!add_obstacle(y, n, v)) return false;
+            bt_parts p;
+            if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &p)) {
+                if (!add_obstacle(y, n, v, false)) return false;
+                continue;
+            }
+            for (int i = 0, at = 0; i < p.n; at += p.count[i++]) {
+                double part[2 * BT_MAX_VERTICES];
+                for (int k = 0; k < p.count[i]; k++) memcpy(part + 2 * k, v + 2 * p.corner[at + k], 2 * sizeof *v);
+                if (!add_obstacle(y, p.count[i], part, true)) return false;
+            }
         }
     return true;
 }

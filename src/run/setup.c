@@ -16,6 +16,8 @@
 #include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
+#include "geometry/weld.h"
+#include "space/shore.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
@@ -105,18 +107,65 @@ static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roste
     }
 }
 
-static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+/// Turn the outline by yaw and move it to (x, y), or back.
+static void carry(int n, double *v, double x, double y, double yaw, bool back)
 {
+    double s, c;
+    bt_sincos(back ? -yaw : yaw, &s, &c);
+    for (int k = 0; k < n; k++) {
+        const double px = v[2 * k] - (back ? x : 0), py = v[2 * k + 1] - (back ? y : 0);
+        v[2 * k] = c * px - s * py + (back ? 0 : x);
+        v[2 * k + 1] = s * px + c * py + (back ? 0 : y);
+    }
+}
+
+/// Outlines of the floes by hand [n_floes], about their places: those of fixed ones that lie flush have common
+/// vertices.
+static bt_welded *outlines_by_hand(const bt_case *c, const bt_world *w)
+{
+    bt_welded *all = bt_alloc((size_t)c->n_floes, sizeof *all), *fixed = bt_alloc((size_t)c->n_floes, sizeof *fixed);
+    int n_fixed = 0;
     for (bt_idx i = 0; i < c->n_floes; i++) {
         const bt_floe_def *g = &c->floes[i];
-        double v[2 * BT_MAX_VERTICES];
-        int n = bt_case_floe_outline(g, v);
+        all[i].n = bt_case_floe_outline(g, all[i].v);
+        if (!g->fixed) continue;
+        fixed[n_fixed] = all[i];
+        carry(all[i].n, fixed[n_fixed++].v, g->x, g->y, g->yaw, false);
+    }
+    bt_welded *moved = bt_alloc((size_t)n_fixed, sizeof *moved);
+    memcpy(moved, fixed, (size_t)n_fixed * sizeof *moved);
+    bt_weld(n_fixed, moved, w->par.slop, w->par.period_x, w->par.period_y);
+    for (bt_idx i = 0, k = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        if (!g->fixed) continue;
+        if (memcmp(moved[k].v, fixed[k].v, 2 * (size_t)moved[k].n * sizeof *moved[k].v)) {
+            all[i] = moved[k];
+            carry(all[i].n, all[i].v, g->x, g->y, g->yaw, true);
+        }
+        k++;
+    }
+    free(fixed);
+    free(moved);
+    return all;
+}
+
+static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    bt_welded *outline = outlines_by_hand(c, w);
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        const double *v = outline[i].v;
+        const int n = outline[i].n;
         bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
                          .vx = bt_case_start(g->vx), .vy = bt_case_start(g->vy), .yaw_rate = g->yaw_rate};
         floe_def(c, n, v, g->thickness, &d);
+        bt_parts parts;
+        if (!bt_outline_convex(n, v) && bt_outline_split(n, v, &parts)) d.parts = &parts;
         d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = g->thickness;
     }
+    free(outline);
+    bt_shore_create(w);
 }
 
 static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
@@ -315,28 +364,30 @@ static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
     return n;
 }
 
-/// Are a and b, which lies d from a, apart, also while a moves on by (dx, dy) relative to b? Separating axes of the
-/// convex hull of both ends of the path: edge normals of a and of b, and the normal of the path.
-static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double d[2], double dx, double dy)
+/// Are the parts p of a and q of b, which lies d from a, apart, also while a moves on by (dx, dy) relative to b?
+/// Separating axes of the convex hull of both ends of the path: edge normals of a and of b, and the normal of the path.
+static bool parts_apart_on_path(const bt_world *w, bt_idx a, int p_first, bt_idx b, int q_first, const double d[2],
+                                double dx, double dy)
 {
     const bt_bodies *bd = &w->bodies;
-    const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
+    const int64_t from_a = bd->offset[a] + p_first, from_b = bd->offset[b] + q_first, na = bd->mark[from_a].count,
+                  nb = bd->mark[from_b].count;
     for (int64_t k = 0; k <= na + nb; k++) {
         double nx = -dy, ny = dx;
         if (k < na + nb) {
-            const int64_t first = k < na ? bd->offset[a] : bd->offset[b], m = k < na ? na : nb,
+            const int64_t first = k < na ? from_a : from_b, m = k < na ? na : nb,
                           at = k < na ? k : k - na;
             const double *p = bd->outline + 2 * (first + at), *q = bd->outline + 2 * (first + (at + 1) % m);
             nx = q[1] - p[1], ny = p[0] - q[0];
         }
         double low_a = INFINITY, high_a = -INFINITY, low_b = INFINITY, high_b = -INFINITY;
         const double along = nx * dx + ny * dy, offset = nx * d[0] + ny * d[1];
-        for (int64_t i = bd->offset[a]; i < bd->offset[a + 1]; i++) {
+        for (int64_t i = from_a; i < from_a + na; i++) {
             const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1];
             low_a = bt_min(low_a, p + bt_min(along, 0));
             high_a = bt_max(high_a, p + bt_max(along, 0));
         }
-        for (int64_t i = bd->offset[b]; i < bd->offset[b + 1]; i++) {
+        for (int64_t i = from_b; i < from_b + nb; i++) {
             const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1] + offset;
             low_b = bt_min(low_b, p);
             high_b = bt_max(high_b, p);
@@ -344,6 +395,15 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double d[
         if (low_b >= high_a || low_a >= high_b) return true;
     }
     return false;
+}
+
+static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double d[2], double dx, double dy)
+{
+    const bt_bodies *bd = &w->bodies;
+    for (int p = bt_part_first(bd, a); p >= 0; p = bt_part_next(bd, a, p))
+        for (int q = bt_part_first(bd, b); q >= 0; q = bt_part_next(bd, b, q))
+            if (!parts_apart_on_path(w, a, p, b, q, d, dx, dy)) return false;
+    return true;
 }
 
 /// The same for a displaced by from, and all images of b around the periods.
@@ -436,19 +496,44 @@ static bool check_closing(const bt_case *c, const bt_field *f, bt_errors *err)
     return false;
 }
 
-/// A pair has one contact, with the nearest image: across a period there must be room for both images apart.
-static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall, bt_errors *err)
+/// How far fixed body i reaches from its centroid along an axis, m.
+static double reach_along(const bt_bodies *b, bt_idx i, int axis)
 {
-    double first = 0, second = 0; // the two largest radii
+    double reach = 0;
+    for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) reach = bt_max(reach, fabs(b->outline[2 * k + axis]));
+    return reach;
+}
+
+/// A pair has one contact, with the nearest image: across a period there must be room for both images apart. Fixed
+/// bodies do not turn, and do not meet each other.
+static bool check_periods(const bt_case *c, const bt_world *w, bt_idx n_field, bt_idx first_wall, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    double first = 0, second = 0, fixed[2] = {0, 0}; // the two largest radii, and what fixed bodies reach
+    bt_idx longest[2] = {-1, -1};
     for (bt_idx i = 0; i < first_wall; i++) {
-        const double r = w->bodies.radius[i];
+        for (int k = 0; k < 2 && b->motion[i] == BT_STATIC; k++) {
+            const double r = reach_along(b, i, k);
+            if (r > fixed[k]) fixed[k] = r, longest[k] = i;
+        }
+        if (b->motion[i] == BT_STATIC) continue;
+        const double r = b->radius[i];
         if (r > first) second = first, first = r;
         else if (r > second) second = r;
     }
-    const double need = 2 * (first + second);
     const double periods[2] = {w->par.period_x, w->par.period_y};
     bool sound = true;
-    for (int k = 0; k < 2; k++)
+    for (int k = 0; k < 2; k++) {
+        const double need = 2 * (first + second), beside = 2 * (first + fixed[k]);
+        if (periods[k] > 0 && first > 0 && beside >= periods[k]) {
+            bt_errors_add(err,
+                          "%s: domain.%s: the period of %g m has no room for the largest body, as it turns, beside "
+                          "floes[%d], which is fixed, and its image, %.4g m; cut that floe in two: fixed floes that "
+                          "lie flush act as one",
+                          c->path ? c->path : "case", k ? "width" : "length", periods[k],
+                          (int)(longest[k] - n_field), beside);
+            sound = false;
+        }
         if (periods[k] > 0 && need >= periods[k]) {
             bt_errors_add(
                 err,
@@ -457,6 +542,7 @@ static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall
                 c->path ? c->path : "case", k ? "width" : "length", periods[k], need);
             sound = false;
         }
+    }
     return sound;
 }
 
@@ -542,7 +628,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     *out = w;
     if (!drifts) return BT_ERR_CASE;
-    const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
+    const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, f->n, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;
 
     // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls

@@ -5,7 +5,8 @@
 // the border; a cell has some dozens, and comparing boxes that lie in a row in memory is quicker than any finer grid.
 // The list holds while no body of the block has travelled (path of its fastest point) farther than its share of the
 // clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
-// floes of the cell itself; one that can be moved has its pairs in the last cell.
+// floes of the cell itself; one that can be moved has its pairs in the last cell. Shores have a tree of their own
+// (shore.h).
 //
 // Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
 // far towards each other, a step looks at these near ones alone.
@@ -24,6 +25,7 @@ void bt_pair_scratch_free(bt_pair_scratch *s)
     free(s->box);
     free(s->body);
     free(s->found);
+    free(s->shore.found);
     *s = (bt_pair_scratch){0};
 }
 
@@ -85,6 +87,30 @@ static void append(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, b
             double other[N_BOX];
             box_of_part(bd, b, q, bd->mark[bd->offset[b] + q].count, other);
             if (near(&w->par, box, other, clearance)) append_parts(s, n, a, b, p, q);
+        }
+    }
+}
+
+/// Body i, whose box this is, and the polygons of shores whose boxes come within clearance of it.
+static void append_shore(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, const double *box,
+                         double clearance)
+{
+    const bt_bodies *b = &w->bodies;
+    if (!w->shore || b->motion[i] != BT_DYNAMIC) return;
+    const double low[2] = {box[X] + box[LOW_X] - clearance, box[Y] + box[LOW_Y] - clearance},
+                 high[2] = {box[X] + box[HIGH_X] + clearance, box[Y] + box[HIGH_Y] + clearance};
+    bt_shore_near(w, box[X], box[Y], low, high, &s->shore);
+    for (size_t k = 0; k < s->shore.n; k++) {
+        const bt_shore_polygon *p = &s->shore.found[k];
+        const bt_idx l = bt_world_index(w, p->gid);
+        const bool first = b->gid[i] < p->gid;
+        double other[N_BOX];
+        box_of_part(b, l, p->part, p->count, other);
+        for (int q = bt_part_first(b, i); q >= 0; q = bt_part_next(b, i, q)) {
+            double own[N_BOX];
+            box_of_part(b, i, q, b->mark[b->offset[i] + q].count, own);
+            if (!near(&w->par, own, other, clearance)) continue;
+            append_parts(s, n, first ? i : l, first ? l : i, first ? q : p->part, first ? p->part : q);
         }
     }
 }
@@ -195,13 +221,15 @@ static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, doub
     between(w, s, own, diagonal, clearance, &n);
     between(w, s, right, above, clearance, &n);
     for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
-        if (b->motion[l] == BT_DYNAMIC) continue;
+        if (b->motion[l] == BT_DYNAMIC || bt_shore_holds(w, l)) continue;
         double box[N_BOX];
         box_of(b, l, box);
         for (size_t i = own.begin; i < own.end; i++)
             if (near(&w->par, box, s->box + N_BOX * i, clearance_large))
                 append(w, s, &n, l, s->body[i], clearance_large);
     }
+    for (size_t i = own.begin; i < own.end; i++)
+        append_shore(w, s, &n, s->body[i], s->box + N_BOX * i, clearance_large);
     return n;
 }
 
@@ -242,9 +270,12 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
     for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
+        if (bt_shore_holds(w, l)) continue;
         double box[N_BOX];
         box_of(b, l, box);
+        append_shore(w, s, &n, l, box, clearance_large);
         for (bt_idx o = l + 1; o < b->n; o++) {
+            if (bt_shore_holds(w, o)) continue;
             double other[N_BOX];
             box_of(b, o, other);
             if (near(&w->par, box, other, clearance_large)) append(w, s, &n, l, o, clearance_large);

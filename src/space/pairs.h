@@ -4,6 +4,7 @@
 #define BERGTOW_PAIRS_H
 
 #include "space/cells.h"
+#include "space/shore.h"
 
 /// Room that one thread works in.
 typedef struct bt_pair_scratch {
@@ -12,6 +13,7 @@ typedef struct bt_pair_scratch {
     size_t cap_boxes;
     bt_pair *found;       ///< [cap_found]
     size_t cap_found;
+    bt_shore_list shore;  ///< polygons near a body
 } bt_pair_scratch;
 
 /// Make the list of cell k, kept in t, anew unless it holds for this margin.

@@ -12,6 +12,7 @@
 #include "partition/domain.h"
 #include "solve/solver.h"
 #include "space/cells.h"
+#include "space/shore.h"
 #include "step/window.h"
 #include "tow/tow.h"
 
@@ -35,6 +36,7 @@ void bt_world_free(bt_world *w)
     bt_solver_free(w->solver);
     bt_forces_free(w->forces);
     bt_domain_free(w->domain);
+    bt_shore_free(w->shore);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
     bt_tow_free(w->tow);

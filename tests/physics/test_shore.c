@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+// Fixed bodies against each other: contacts of a convex outline that is cut into pieces against that outline, and the
+// search for polygons against all pairs.
+#include "all_pairs.h"
+
+#include "geometry/apart.h"
+#include "space/shore.h"
+
+static const double SLOP = 1e-4; // m
+
+static bt_world *world_of(double period)
+{
+    bt_params p = scene_params(0.1, 1);
+    p.slop = SLOP;
+    p.period_x = p.period_y = period;
+    return bt_world_create(&p);
+}
+
+static void add_fixed(bt_world *w, int n, const double *at)
+{
+    double v[2 * BT_MAX_VERTICES];
+    memcpy(v, at, 2 * (size_t)n * sizeof *v);
+    const bt_moments m = bt_shape_centre(n, v);
+    const bt_body_def d = {.motion = BT_STATIC, .n_vertices = n, .vertices = v, .x = m.cx, .y = m.cy};
+    bt_world_add(w, &d);
+}
+
+/// Adds a polygon in pieces: cut by random lines again and again, so that seams end on edges of other pieces.
+static void add_pieces(bt_world *w, uint64_t *rng, int n, const double *v, int cuts)
+{
+    const bt_moments m = bt_shape_moments(n, v);
+    if (cuts > 0) {
+        const double a = 2 * BT_PI * scene_uniform(rng), nx = cos(a), ny = sin(a), d = nx * m.cx + ny * m.cy;
+        double one[2 * BT_MAX_VERTICES], other[2 * BT_MAX_VERTICES];
+        const int n_one = bt_shape_clip(n, v, nx, ny, d, one), n_other = bt_shape_clip(n, v, -nx, -ny, -d, other);
+        add_pieces(w, rng, n_one, one, cuts - 1);
+        add_pieces(w, rng, n_other, other, cuts - 1);
+        return;
+    }
+    add_fixed(w, n, v);
+}
+
+/// How far outline v reaches along (nx, ny).
+static double support(int n, const double *v, double nx, double ny)
+{
+    double most = -INFINITY;
+    for (int i = 0; i < n; i++) most = bt_max(most, nx * v[2 * i] + ny * v[2 * i + 1]);
+    return most;
+}
+
+static double distance_to_edges(int n, const double *v, int m, const double *o)
+{
+    double least = INFINITY;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < m; j++) {
+            const double *x = v + 2 * i, *e = o + 2 * j, *f = o + 2 * ((j + 1) % m), dx = f[0] - e[0], dy = f[1] - e[1];
+            double t = ((x[0] - e[0]) * dx + (x[1] - e[1]) * dy) / (dx * dx + dy * dy);
+            t = t < 0 ? 0 : t > 1 ? 1 : t;
+            least = bt_min(least, hypot(e[0] + t * dx - x[0], e[1] + t * dy - x[1]));
+        }
+    return least;
+}
+
+/// A floe beside an outline in pieces has a contact exactly if it is near the outline, its least gap is the distance,
+/// and each contact pushes along a normal that the outline itself has there: to the side of a plane that holds all of
+/// it.
+static void pieces_touch_as_their_outline_does(void **state)
+{
+    (void)state;
+    uint64_t rng = 5;
+    const double margin = bt_margin_for(&(bt_world){.par = {.dt = 0.1, .slop = SLOP, .size = 1}}, 1);
+    int seen = 0, deep = 0;
+    for (int scene = 0; scene < 40; scene++) {
+        double outline[2 * BT_MAX_VERTICES];
+        const int n = scene_random_polygon(&rng, 4, outline);
+        bt_world *w = world_of(0);
+        add_pieces(w, &rng, n, outline, 1 + scene % 4);
+        const bt_idx n_pieces = w->bodies.n;
+        double v[2 * BT_MAX_VERTICES];
+        const int k = scene_random_polygon(&rng, 0.5, v);
+        bt_body_def d = scene_prism(k, v, 900);
+        const bt_gid probe = bt_world_add(w, &d);
+        bt_shore_create(w);
+        assert_true(bt_shore_has(w->shore, 0) && !bt_shore_has(w->shore, probe));
+        for (int place = 0; place < 400; place++) {
+            // to the surface along a random direction, and a little farther or nearer
+            const bt_idx i = bt_world_index(w, probe);
+            bt_pose *p = &w->bodies.pose[i];
+            const double a = 2 * BT_PI * scene_uniform(&rng);
+            *p = (bt_pose){6 * cos(a), 6 * sin(a), 6 * scene_uniform(&rng)};
+            bt_bodies_turn(&w->bodies, i);
+            const double *own = w->bodies.outline + 2 * w->bodies.offset[i];
+            double low = 0, high = 1;
+            for (int s = 0; s < 50; s++) {
+                const double f = 0.5 * (low + high);
+                if (bt_apart_of(n, outline, k, own, f * p->x, f * p->y).gap > 0) high = f;
+                else low = f;
+            }
+            const double away = high + (scene_uniform(&rng) - 0.2) * margin / 6;
+            p->x *= away, p->y *= away;
+            double at[2 * BT_MAX_VERTICES];
+            for (int j = 0; j < k; j++) at[2 * j] = p->x + own[2 * j], at[2 * j + 1] = p->y + own[2 * j + 1];
+            bt_manifold *man;
+            bt_idx n_man;
+            brute_force(w, margin, &man, &n_man);
+            const double gap = bt_apart_of(n, outline, k, own, p->x, p->y).gap,
+                         distance = bt_min(distance_to_edges(n, outline, k, at), distance_to_edges(k, at, n, outline));
+            double least = INFINITY;
+            for (bt_idx c = 0; c < n_man; c++)
+                for (int j = 0; j < man[c].n_points; j++) {
+                    const bt_manifold *m = &man[c];
+                    const double nx = m->b == i ? m->nx : -m->nx, ny = m->b == i ? m->ny : -m->ny;
+                    const double *arm = m->b == i ? m->p[j].rb : m->p[j].ra;
+                    const double x = p->x + arm[0], y = p->y + arm[1];
+                    // no part of the outline is beyond the plane through the point, but for the gap that it halves
+                    if (support(n, outline, nx, ny) - (nx * x + ny * y) > margin + 1e-9)
+                        fail_msg("scene %d, place %d: a contact at (%g, %g) along (%g, %g) is inside the outline", scene,
+                                 place, x, y, nx, ny);
+                    least = bt_min(least, m->p[j].gap);
+                }
+            free(man);
+            if (gap > 0 && distance < margin - 0.02) {
+                CHECK_CLOSE(least, distance, 0.012);
+                seen++;
+            } else if (gap > 0 && distance > margin + 1e-6) {
+                assert_true(isinf(least));
+            } else if (gap < 0) {
+                CHECK_CLOSE(least, gap, 0.012 - 0.5 * gap);
+                deep++;
+            }
+        }
+        assert_int_equal(w->bodies.n, n_pieces + 1);
+        bt_world_free(w);
+    }
+    assert_true(seen > 4000 && deep > 1000);
+}
+
+/// The tree finds the polygons of a shore as a look at all pairs does, also across periods.
+static void detection_on_a_shore_equals_brute_force(void **state)
+{
+    (void)state;
+    uint64_t rng = 9;
+    bt_idx total = 0;
+    for (int scene = 0; scene < 8; scene++) {
+        bt_world *w = world_of(scene % 2 ? 24 : 0);
+        for (int k = 0; k < 24; k++) { // a band across the period, of pieces that lie in each other
+            double v[2 * BT_MAX_VERTICES];
+            const int n = scene_random_polygon(&rng, 1, v);
+            for (int j = 0; j < n; j++) v[2 * j] += k + 0.5, v[2 * j + 1] += 12 + 2 * sin(k);
+            add_fixed(w, n, v);
+        }
+        for (int k = 0; k < 150; k++) {
+            double v[2 * BT_MAX_VERTICES];
+            const int n = scene_random_polygon(&rng, 0.4, v);
+            bt_body_def d = scene_prism(n, v, 900);
+            d.x = 24 * scene_uniform(&rng), d.y = 24 * scene_uniform(&rng);
+            bt_world_add(w, &d);
+        }
+        bt_shore_create(w);
+        for (int move = 0; move < 6; move++) {
+            const double margin = bt_margin_for(w, 1);
+            detect_all(w, margin);
+            bt_manifold *want;
+            bt_idx n_want, n_have = 0;
+            brute_force(w, margin, &want, &n_want);
+            for (bt_idx k = 0; k < w->cells->n; k++) n_have += w->cells->cell[k].n_contacts;
+            assert_int_equal(n_have, n_want);
+            for (bt_idx k = 0; k < n_want; k++) total += bt_shore_holds(w, want[k].a) || bt_shore_holds(w, want[k].b);
+            free(want);
+            for (bt_idx i = 0; i < w->bodies.n; i++) {
+                if (w->bodies.motion[i] != BT_DYNAMIC) continue;
+                w->bodies.pose[i].x += 0.3 * (scene_uniform(&rng) - 0.5);
+                w->bodies.pose[i].y += 0.3 * (scene_uniform(&rng) - 0.5);
+                w->bodies.path[i] += 0.3;
+            }
+            w->cells->relabel = true;
+        }
+        bt_world_free(w);
+    }
+    assert_true(total > 500);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pieces_touch_as_their_outline_does),
+        cmocka_unit_test(detection_on_a_shore_equals_brute_force),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
