@@ -49,6 +49,14 @@ def test_the_mean_of_series_that_are_none():
     assert 1 / 200 <= swinging.se * np.sqrt(200) < 1
 
 
+def test_the_variance_of_a_batch_mean_by_hand():
+    """Values that alternate, from their sum of squares: twelve, from which their correlation is taken, too, -11/12; of
+    six none is."""
+    swinging = (-1.0) ** np.arange(12)
+    assert stat_mean.batch_variance(swinging) == pytest.approx(12 / (12 - 2) * (1 - 11 / 12) / (1 + 11 / 12))
+    assert stat_mean.batch_variance(swinging[:6]) == pytest.approx(6 / (6 - 1))
+
+
 @pytest.mark.parametrize("n", [8, 20])
 def test_95_percent_of_the_intervals_between_fields_hold_the_mean(n):
     x = np.random.default_rng(7).normal(3, 1, (TRIALS, n))
@@ -307,6 +315,16 @@ def test_profile_likelihood_of_a_normal_mean():
     assert stat_profile.interval(lambda q, _: 1 - np.exp(-q * q), 0.0, [0.0], 2.0, 0.1) == (-np.inf, np.inf)
 
 
+def test_the_error_of_the_rate_is_in_the_interval_of_a_level():
+    """A level that is exceeded little less often than the threshold hangs on how often that is: from n clusters its
+    logarithm is known to 1/sqrt(n), and so is the level in units of the scale, whatever is known of the scale."""
+    fields = poisson_fields(np.random.default_rng(4), 3)  # too few for the scatter between fields
+    found = stat_extreme.over_threshold(fields, [0.0041], 0.0, threshold=20.0, resamples=1)
+    assert 1.0 < found["rate_per_hour"] * found["levels"][0]["hours"] < 1.2
+    low, high = found["levels"][0]["level_95"]
+    assert (high - low) / 2 > 0.8 * 1.96 * found["scale"] / np.sqrt(found["clusters"])
+
+
 def test_clustered_peaks_count_once():
     rng = np.random.default_rng(5)
     fields = poisson_fields(rng, 6, rate=100)
@@ -325,6 +343,8 @@ def test_what_no_tail_is_fitted_to():
     few = poisson_fields(rng, 2, rate=10)
     assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(few, [1.0], 0.0)["refused"]
     assert "needs 30" in stat_extreme.over_threshold(few, [1.0], 0.0, threshold=1e9)["refused"]
+    fewer = [f | {"time": f["time"][:3], "peak": f["peak"][:3]} for f in few]  # one largest of six is no limit
+    assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(fewer, [1.0], 0.0)["refused"]
     assert "without a collision" in stat_extreme.by_blocks(few, [1.0], blocks=30)["refused"]
     assert "raise --blocks" in stat_extreme.by_blocks(few, [1.0], blocks=2)["refused"]
     seldom = stat_extreme.over_threshold(poisson_fields(rng, 6, rate=100), [0.001], 0.0, threshold=100.0, resamples=1)
