@@ -227,6 +227,7 @@ MUTANTS = {
         ("    s->n_kept = 0;\n", "", "contacts of an earlier step come back"),
         ("w->cells->cell[q->cell].contacts[q->at] = q->was;", "(void)q;", "rows of the second projection stay"),
         ("if (l->record[law] >= 0) return false;", ";", "rafted floes are pushed apart"),
+        (" + slip);", ");", "a floe that slides along a turning bar stays inside it"),
         ("if (*(const bool *)shifted) g->gap[i] +=", "if (*(const bool *)shifted) g->gap[i] -=",
          "the second projection sees the first backwards"),
     ]),
@@ -335,6 +336,15 @@ MUTANTS = {
         ("bt_domain_tell_cells(w, t->speed, spread);", "", "speeds of other ranks"),
         ("if (movable) t->bound[n] = bt_max(t->bound[n], fastest);", "", "the body does not see fast floes"),
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
+    ]),
+    "src/contact/merge.c": (["physics/test_parts"], [
+        ("|| (man[j].n_points == 1 && j < i)", "", "a corner at a cut is two points"),
+    ]),
+    "src/contact/work.c": (["unit/test_restitution"], [
+        ("+ fabs(u->lt));", ");", "what a residual can have given leaves friction out"),
+    ]),
+    "src/contact/overlap.c": (["physics/test_rafting"], [
+        ("* bt_min(1, depth / blend);", ";", "sides that lie on each other push"),
     ]),
     "src/contact/law.c": (["physics/test_crush", "physics/test_rafting", "scenes:crushing,rafting_press",
                            "ranks:crushing_press,rafting_press",
@@ -640,8 +650,16 @@ MUTANTS = {
          "a ripple that nobody feels is too short"),
         ("(h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n", "0", "unconverged steps are not counted"),
         ("s->unconverged > BT_STEADY_UNCONVERGED", "s->unconverged > 1", "unconverged windows are steady"),
+        ("&& e->time > s->start)", ")", "a branch that parted before the window"),
+        ("|| p[2 * i + 2] <= s->start", "", "a programme that changes before the window"),
+        ("|| p[2 * i] >= s->end", "", "a programme that changes beyond the window"),
         ("if (!isnan(x) && !(x <= most)) most = x;", "if (!isnan(x)) most = x;",
          "the last branch, not the strongest"),
+    ]),
+    "src/output/summary_window.c": (["unit/test_summary"], [
+        ("floes = (double)(v->renewed + v->kept);", "floes = (double)(v->renewed + v->missed);",
+         "floes that come back, of the places ahead"),
+        ("(double)v->kept > SHARE_LIMIT * floes", "(double)v->kept > floes", "disturbed ice that comes back"),
     ]),
     "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting",
                              "cli/test_older_checkpoint.py::test_what_was_not_counted_is_not_known"], [
@@ -653,6 +671,17 @@ MUTANTS = {
          "steps of before a number was taken"),
         ("TOTAL(I64, positive_work, STEPS, added_energy)", "TOTAL(I64, positive_work, STEPS, repeats)",
          "energy from contacts"),
+    ]),
+    "src/run/run_state.c": (["unit/test_state_check"], [
+        ("r->totals.wall_time + bt_clock() - r->began", "r->totals.wall_time", "wall time since the last stop"),
+        ("r->totals.wall_time = bt_snapshot_real(s, \"clock/wall_time\");", "", "wall time before the last stop"),
+        ("r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS", "true", "a negative number of steps in a row"),
+        ("isfinite(r->totals.wall_time)", "true", "a wall time that is no number"),
+    ]),
+    "src/run/study_axes.c": (["cli/test_bad_study.py"], [
+        ("*y = sorted[first];", "*y = sorted[i - 1];", "a parameter's own key under a second of its values"),
+        ("if (x->axis == y->axis && s->parameter[y->axis].name != y->text) continue;", "",
+         "each value of a parameter has keys of its own"),
     ]),
     "src/run/guard.c": (["unit/test_guard", "cli/test_guards.py"], [
         ("return UNIT * bt_sum_value(&t.sum[0]);", "return bt_sum_value(&t.sum[0]);", "unit of the energy"),

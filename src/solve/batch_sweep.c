@@ -71,20 +71,19 @@ BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[
     }
 }
 
-/// As bt_limit_normals where no bound rises.
+/// As bt_limit_normals where no bound rises. The second point of a contact with one has no mass and no bound: of all
+/// sides of the rim it stays at 0, and the first comes to its bound, as it does alone.
 BT_INLINE void bound_normals(const bt_batch *o, const vec bound[2], const motion *p, const motion *q, vec *l1, vec *l2)
 {
     const mask over = (*l1 > bound[0]) | (*l2 > bound[1]);
     if (!any_of(over)) return;
-    const vec zero = {0}, un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
+    const vec un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
     vec b[2], l[2] = {*l1, *l2};
     for (int i = 0; i < 2; i++)
         b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
-    const vec alone = bt_larger(zero, bt_smaller(-b[0] * o->mn[0], bound[0]));
     rim(o, bound, b, l);
-    const mask one = o->mn[1] == zero;
-    *l1 = bt_choose(over, bt_choose(one, alone, l[0]), *l1);
-    *l2 = bt_choose(over & ~one, l[1], *l2);
+    *l1 = bt_choose(over, l[0], *l1);
+    *l2 = bt_choose(over, l[1], *l2);
 }
 
 /// As bt_update_sheets; lanes without a contact have a disc of 0 and no step.

@@ -33,14 +33,15 @@ enum { TURNS, N_FOUND };
 enum { LEFT = 5 }; // slops that a turn may leave as overlap: half of what a run warns of, assumed
 
 /// May the turn of contact j in this step, whose gaps are those at its end, have left more than `least` of overlap, m?
-/// Only of pairs that touch with their outlines as they are: what has given way is no overlap.
+/// Only of pairs that touch with their outlines as they are: what has given way is no overlap. Sheets are of a pair that
+/// has.
 static bool turns(const bt_world *w, const bt_cell *cell, bt_idx j, double least)
 {
     const bt_bodies *b = &w->bodies;
     const bt_contact *u = &cell->contacts[j];
     const bt_vel *va = &b->vel[u->a], *vb = &b->vel[u->b];
     const double turn = w->par.dt * fabs(vb->w - va->w);
-    if (turn == 0 || u->n == 0) return false;
+    if (turn == 0) return false;
     const double *g = cell->gaps[j].gap, gap = u->n > 1 ? bt_min(g[0], g[1]) : g[0];
     const double slip = w->par.dt * fabs(bt_tangent_velocity(u, va, vb));
     const double error = turn * (0.5 * turn * (b->radius[u->a] + b->radius[u->b]) + slip);

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Study files that are refused: each fault with its line, its key and what to do."""
 import pytest
-from harness import CASE, TOW, call, write_case
+from harness import CASE, DONE, TOW, call, write_case
 
 STUDIES = {
     "list for a word": ("title: [a]\n", "study.yml:2: title: needs a single value"),
@@ -70,6 +70,20 @@ def test_refused_study(tmp_path, kind):
     assert result.returncode == CASE, result.stderr
     assert any("study.yml" in line and fragment in line for line in result.stderr.splitlines()), result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_key_of_several_values_of_one_parameter(tmp_path):
+    """Each value of a parameter may bring the same key. The parameter's own key belongs to it in all of them, and each
+    place that gives it is named."""
+    write_case(tmp_path, TOW)
+    study = "base: case.yml\nparameters: {ice.size: [1, 2]}\nwith:\n  ice.size=1: {KEY: 3}\n  ice.size=2: {KEY: 4}\n"
+    (tmp_path / "study.yml").write_text(study.replace("KEY", "domain.width"))
+    assert call("check", "study.yml", cwd=tmp_path).returncode == DONE
+    (tmp_path / "study.yml").write_text(study.replace("KEY", "ice.size"))
+    said = call("check", "study.yml", cwd=tmp_path)
+    assert said.returncode == CASE
+    for line in 4, 5:
+        assert f"study.yml:{line}: ice.size: is given under `with`, and under `parameters` in study.yml:2" in said.stderr
 
 
 def test_study_without_base(tmp_path):

@@ -311,6 +311,7 @@ def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
     found = plain(budget.of_all(cut, ["mean_ice_resistance_n"], None))
     assert compared.stale(found, cut) == "" == compared.stale({}, cut)
     assert compared.stale(found, whole) == "of 30 members, while 40 have finished"
+    assert compared.stale(compared.state(whole), cut) == "of 40 members, while 30 have finished"
     whole.study += "another"
     assert compared.stale(found, whole) == "of another study than its folder holds"
     assert found["values"] == {"ice.concentration": "0.5"}

@@ -75,6 +75,21 @@ def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
     assert converge_text.cells(row)[-1] == "a run has no mean ice resistance"
 
 
+@pytest.mark.parametrize("missed", [{}, {"case": 2}, {"tolerance-1": 2}])
+def test_steps_that_either_value_does_not_solve_leave_the_comparison_open(missed):
+    """Of 100 steps of each run; also where only the tighter tolerance is out of reach."""
+    def measured(name, fields, measure):
+        return np.array([measure(SimpleNamespace(
+            window=(10.0, 40.0), adrift=np.inf,
+            number=lambda key, i=i: {"n_steps": 100, "unconverged_steps": missed.get(name, 0)}.get(key, 50.0 + i)))
+            for i in fields])
+    kind = next(k for k in converge.KINDS if k.name == "tolerance")
+    row = converge.compare(SimpleNamespace(there=lambda *a: True, measured=measured), kind, "case", {}, "tolerance-1",
+                           {}, 0.1)
+    assert row["judged"] == ("open" if missed else "none") and row["fields"] == 4
+    assert row.get("why", "").startswith("2 % of the steps ended at solver.max_sweeps") == bool(missed)
+
+
 def test_a_window_without_resistance_has_nothing_to_compare(monkeypatch):
     """Red when it is 0 / 0: field after field is made until the budget is spent."""
     class Empty:

@@ -143,6 +143,14 @@ def test_blocks_of_fields_of_unlike_length():
     assert [len(x) for x in each] == [2, 2, 0, 5] and each[3].tolist() == [48, 98, 148, 198, 249]
 
 
+def test_what_a_field_has_beyond_its_whole_blocks_is_in_none():
+    """The last 30 samples of 130, the largest, in a field of two blocks of 50."""
+    fields = [{"time": np.arange(1.0, n + 1), "peak": np.arange(float(n)), "start": 0.0, "hours": n / 3600}
+              for n in (100, 130)]
+    each, _ = stat_extreme._blocks(fields, 2)
+    assert [x.tolist() for x in each] == [[48, 99], [48, 99]]
+
+
 def test_no_field_is_lost_to_blocks_as_long_as_the_middle_one():
     """Red: of 40 fields of 0.8 to 1 h the shorter half had no block, and a load in one of them was in no level."""
     rng = np.random.default_rng(3)
@@ -283,6 +291,15 @@ def test_the_threshold_of_a_signal_leaves_sixty_clusters():
     fields = fields_of(AR1(0.9), 12, 2000, np.random.default_rng(3))
     found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)["over_threshold"]
     assert 60 <= found["clusters"] < 75 and found["excesses"] < 0.03 * 12 * 2000
+
+
+def test_clusters_are_told_apart_by_the_fields_that_change_and_by_the_longest_time_scale():
+    """A field that meets no ice has no correlation time, and the filter of one field may be longer than another's."""
+    still = {"time": np.arange(1.0, 2001), "peak": np.full(2000, 7.0), "hours": 2000 / 3600, "dt": 1.0, "scale": 1.0}
+    moving = fields_of(AR1(0.95), 1, 2000, np.random.default_rng(2))[0]
+    gap = stat_load.gap_of([moving])
+    assert gap > 10 and stat_load.gap_of([still, moving, still]) == gap and stat_load.gap_of([still]) == 1
+    assert stat_load.gap_of([still, still | {"scale": 1.2}]) == 1.2
 
 
 def test_a_correlated_signal_of_few_clusters_has_no_tail():

@@ -376,8 +376,17 @@ def test_a_damaged_member_is_in_no_number(tmp_path, damage):
             and "Traceback" not in result.stderr)
     assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"
                                                                                                       ] and s["checked"]
+    assert s["behind"] == []  # its record of an end is no news
     assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"][
         "fields"] == 2
+
+
+def test_the_record_of_a_member_is_that_of_its_study(tmp_path):
+    """A member of another study, whatever its files, is none of this one."""
+    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0)])
+    member, study = folder / "members/c001-r001", Ensemble(folder).study.encode()
+    assert soundness.fault_of_member(member, "c001-r001", study) is None
+    assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "study changed since it finished"
 
 
 def test_a_damaged_ensemble_file_is_refused(tmp_path):

@@ -49,6 +49,14 @@ def test_the_mean_of_series_that_are_none():
     assert 1 / 200 <= swinging.se * np.sqrt(200) < 1
 
 
+def test_the_variance_of_a_batch_mean_by_hand():
+    """Values that alternate, from their sum of squares: twelve, from which their correlation is taken, too, -11/12; of
+    six none is."""
+    swinging = (-1.0) ** np.arange(12)
+    assert stat_mean.batch_variance(swinging) == pytest.approx(12 / (12 - 2) * (1 - 11 / 12) / (1 + 11 / 12))
+    assert stat_mean.batch_variance(swinging[:6]) == pytest.approx(6 / (6 - 1))
+
+
 @pytest.mark.parametrize("n", [8, 20])
 def test_95_percent_of_the_intervals_between_fields_hold_the_mean(n):
     x = np.random.default_rng(7).normal(3, 1, (TRIALS, n))
@@ -135,6 +143,8 @@ def test_fits_have_scipys_likelihood(name):
         k = 3 if name == "GEV" else 2
         assert f.aic == pytest.approx(2 * k - 2 * f.log_likelihood) and f.kolmogorov == stats.kstest(
             x, f.frozen.cdf).statistic
+        few = stat_fit.fit(name, x[:12], resamples=0)  # of twelve values a third parameter costs 1.7 more than AIC says
+        assert few.aicc - few.aic == pytest.approx(3 if k == 3 else 4 / 3)
     assert stat_fit.gev_minus_log_likelihood(
         [3, np.log(2), 0.15], x / scale) == pytest.approx(-np.sum(stats.genextreme(-0.15, 3, 2).logpdf(x / scale)))
 
@@ -307,6 +317,16 @@ def test_profile_likelihood_of_a_normal_mean():
     assert stat_profile.interval(lambda q, _: 1 - np.exp(-q * q), 0.0, [0.0], 2.0, 0.1) == (-np.inf, np.inf)
 
 
+def test_the_error_of_the_rate_is_in_the_interval_of_a_level():
+    """A level that is exceeded little less often than the threshold hangs on how often that is: from n clusters its
+    logarithm is known to 1/sqrt(n), and so is the level in units of the scale, whatever is known of the scale."""
+    fields = poisson_fields(np.random.default_rng(4), 3)  # too few for the scatter between fields
+    found = stat_extreme.over_threshold(fields, [0.0041], 0.0, threshold=20.0, resamples=1)
+    assert 1.0 < found["rate_per_hour"] * found["levels"][0]["hours"] < 1.2
+    low, high = found["levels"][0]["level_95"]
+    assert (high - low) / 2 > 0.8 * 1.96 * found["scale"] / np.sqrt(found["clusters"])
+
+
 def test_clustered_peaks_count_once():
     rng = np.random.default_rng(5)
     fields = poisson_fields(rng, 6, rate=100)
@@ -325,6 +345,8 @@ def test_what_no_tail_is_fitted_to():
     few = poisson_fields(rng, 2, rate=10)
     assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(few, [1.0], 0.0)["refused"]
     assert "needs 30" in stat_extreme.over_threshold(few, [1.0], 0.0, threshold=1e9)["refused"]
+    fewer = [f | {"time": f["time"][:3], "peak": f["peak"][:3]} for f in few]  # one largest of six is no limit
+    assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(fewer, [1.0], 0.0)["refused"]
     assert "without a collision" in stat_extreme.by_blocks(few, [1.0], blocks=30)["refused"]
     assert "raise --blocks" in stat_extreme.by_blocks(few, [1.0], blocks=2)["refused"]
     seldom = stat_extreme.over_threshold(poisson_fields(rng, 6, rate=100), [0.001], 0.0, threshold=100.0, resamples=1)
@@ -389,6 +411,14 @@ def test_a_full_factorial_gives_the_analysis_of_variance():
     assert [i["variant"]["total"], i["x"]["total"]] == pytest.approx([1 - b / whole, 1 - a / whole], abs=1e-4)
     assert "variant" not in stat_sensitivity.rank_correlations(
         {"variant": np.array(["s", "h"] * 10, dtype=object), "x": np.arange(20.0)}, np.arange(20.0))
+
+
+def test_what_noise_makes_of_a_coefficient_is_no_effect():
+    """Of coefficients 2, 1 and 0.5, each with a variance of 1, 3 are left of the first one's square and nothing of the
+    others'."""
+    first, total = stat_sensitivity._indices(np.array([9.0, 2.0, 1.0, 0.5]), np.ones(4),
+                                             [(1, 0), (0, 1), (1, 1)], 2)
+    assert first.tolist() == [1, 0] and total.tolist() == [1, 0]
 
 
 def test_samples_that_are_too_small():

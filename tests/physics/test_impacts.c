@@ -273,6 +273,29 @@ static void floes_that_roll_do_not_enter_a_hull(void **state)
     assert_true(once > 12 * 0.03 && twice < 6 * 0.03 && passes > 0);
 }
 
+/// A bar of 40 m turns by 2 mrad in the step, and a square slides outwards along its advancing side by 3 m. Where the
+/// square was nothing closes; 3 m farther the bar has come 6 mm higher. The turn alone would leave 0.04 mm.
+static void a_floe_that_slides_along_a_turning_bar_does_not_enter_it(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(1, 1);
+    p.slop = 5e-4;
+    bt_world *w = bt_world_create(&p);
+    const double turn = 2e-3, slide = 3, from = 5;
+    double bar[8] = {-20, -0.5, 20, -0.5, 20, 0.5, -20, 0.5}, v[8];
+    bt_world_add(w, &(bt_body_def){.motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = bar,
+                                   .yaw_rate = turn / p.dt});
+    scene_square(1, v);
+    bt_body_def f = scene_prism(4, v, 1);
+    f.x = from - 0.5, f.y = 1, f.vx = slide / p.dt, f.vy = turn / p.dt * from;
+    bt_world_add(w, &f);
+    bt_world_step(w);
+    assert_true(w->solver->n_kept > 0);
+    const double deepest = bt_world_overlaps(w, 0).deepest;
+    if (!(deepest < 2 * p.slop)) fail_msg("overlap %g m", deepest);
+    bt_world_free(w);
+}
+
 /// Squares that hit each other with friction and rebound gain energy by Newton's law, and the restitution of their
 /// island is lowered. Another island, which touches no body of it but the same wall, keeps its own: −e v.
 static void a_rebound_is_lowered_in_its_island_alone(void **state)
@@ -308,6 +331,7 @@ int main(void)
         cmocka_unit_test(heavy_body_squeezes_a_row), cmocka_unit_test(projection_adds_no_velocity),
         cmocka_unit_test(what_is_parted_stays_where_it_is),
         cmocka_unit_test(floes_that_roll_do_not_enter_a_hull),
+        cmocka_unit_test(a_floe_that_slides_along_a_turning_bar_does_not_enter_it),
         cmocka_unit_test(a_rebound_is_lowered_in_its_island_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -312,6 +312,38 @@ static void a_cut_does_not_stop_a_slide(void **state)
     }
 }
 
+/// A floe that is cut from corner to corner stands on that corner: both parts touch there, by one point each, and the
+/// two are one.
+static void a_corner_at_a_cut_is_one_point(void **state)
+{
+    (void)state;
+    const bt_params p = params_of_world(0.01);
+    for (int upper = 0; upper < 2; upper++) { // the floe comes before the shore, or after it
+        bt_world *w = bt_world_create(&p);
+        double diamond[] = {0, -1, 1, 0, 0, 1, -1, 0}, shore[] = {-5, -2, 5, -2, 5, 0, -5, 0};
+        const bt_parts parts = {.n = 2, .count = {3, 3}, .n_vertices = 6, .corner = {0, 1, 2, 0, 2, 3}};
+        bt_shape_centre(4, shore);
+        bt_body_def f = scene_prism(4, diamond, 900),
+                    s = {.motion = BT_STATIC, .n_vertices = 4, .vertices = shore, .y = -1};
+        f.parts = &parts, f.x = 0.1, f.y = 1.001;
+        bt_world_add(w, upper ? &s : &f);
+        bt_world_add(w, upper ? &f : &s);
+        bt_manifold *m;
+        bt_idx n;
+        brute_force(w, 0.1, &m, &n);
+        assert_int_equal(n, 1);
+        assert_int_equal(m[0].n_points, 1);
+        CHECK_CLOSE(m[0].p[0].gap, 0.001, 1e-12);
+        free(m);
+        detect_all(w, 0.1);
+        bt_idx rows = 0;
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) rows += w->cells->cell[k].contacts[j].n;
+        assert_int_equal(rows, 1);
+        bt_world_free(w);
+    }
+}
+
 /// A convex floe cut by hand collides like the whole one: off-centre, so that it turns, and with the cut where it is
 /// hit or elsewhere. Where two edges face each other squarely the parts may take the other one's normal, within the tie
 /// of the narrow phase; that is some per cent of the velocities, and happens in few of these.
@@ -444,6 +476,7 @@ int main(void)
         cmocka_unit_test(detect_equals_brute_force_with_parts),
         cmocka_unit_test(a_bay_is_open),
         cmocka_unit_test(a_cut_does_not_stop_a_slide),
+        cmocka_unit_test(a_corner_at_a_cut_is_one_point),
         cmocka_unit_test(parts_collide_like_the_whole),
         cmocka_unit_test(heap_of_stars_keeps_its_balances),
         cmocka_unit_test(pressed_stars_do_not_pass_through_each_other),

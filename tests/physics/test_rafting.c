@@ -7,6 +7,7 @@
 // rafts, a projection that takes rafted overlap back. Each was tried.
 #include "scene.h"
 
+#include "contact/overlap.h"
 #include "contact/raft.h"
 
 static const double ice = 910, water = 1027, gravity = 9.81, kappa = 8, mu = 0.3, h = 1;
@@ -445,10 +446,35 @@ static void residual_adds_no_energy(void **state)
     bt_world_free(w);
 }
 
+/// Rectangles in a row whose long sides lie on each other to rounding: those sides push neither way, the ends do, by
+/// the width of the row. Where they have passed each other by half of the blend, half of their length pushes.
+static void sides_that_lie_on_each_other_do_not_push(void **state)
+{
+    (void)state;
+    const double length = 10, overlap = 4, blend = 0.01;
+    for (int side = -1; side <= 1; side += 2)
+        for (int half = 0; half < 2; half++) {
+            const double aside = side * (half ? 0.5 * blend : 1e-13);
+            bt_params p = params(0.1);
+            bt_world *w = bt_world_create(&p);
+            add_box(w, BT_DYNAMIC, length, length, 0, 0, h);
+            add_box(w, BT_DYNAMIC, length, length, length - overlap, aside, h);
+            bt_overlap o;
+            double grad[2], turn;
+            const bt_idx a = bt_world_index(w, 0), b = bt_world_index(w, 1);
+            bt_overlap_clip(w, a, b, (uint16_t[]){0, 0}, 0, 0, &o);
+            bt_overlap_gradient(w, a, b, (uint16_t[]){0, 0}, &o, blend, grad, &turn);
+            CHECK_CLOSE(grad[0], -(length - fabs(aside)), 1e-9);
+            CHECK_CLOSE(grad[1], half ? -side * 0.5 * overlap : 0, 1e-9);
+            bt_world_free(w);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_squares),
+        cmocka_unit_test(sides_that_lie_on_each_other_do_not_push),
         cmocka_unit_test(the_margin_of_the_search),
         cmocka_unit_test(pushed_shut),
         cmocka_unit_test(out_behind),

@@ -156,6 +156,34 @@ static void stall_windows(void **state)
     }
 }
 
+/// The towing end passes through the hull twice, steps of half a second: how long in all, and from when on. Where it
+/// begins within, the first way out comes first; of a body adrift nothing counts.
+static void the_end_within_the_hull(void **state)
+{
+    (void)state;
+    static const double ahead[] = {0.2, 3, 0.9, 0, -0.9, -3, -0.9, 3};
+    enum { STEPS = sizeof ahead / sizeof *ahead };
+    for (int adrift = 0; adrift < 2; adrift++) {
+        bt_params p = scene_params(0.5, 1);
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(2, v);
+        bt_body_def d = scene_prism(4, v, 100);
+        w->towed = bt_world_add(w, &d);
+        bt_tow tow = {.mode = BT_TOW_LINE, .n_branches = 1, .branch[0].broken = adrift > 0, .travel_x = 7};
+        bt_stall s = {0};
+        w->tow = &tow;
+        for (int k = 0; k < STEPS; k++) {
+            tow.time = 10 + 0.5 * k, tow.carriage_x = tow.travel_x + ahead[k];
+            bt_stall_step(&s, w, 0, 0, 1);
+        }
+        w->tow = NULL;
+        CHECK_CLOSE(s.inside, adrift ? 0 : 4 * 0.5, 0);
+        if (!adrift) CHECK_CLOSE(s.inside_from, 11, 0);
+        bt_world_free(w);
+    }
+}
+
 /// A bound whose impulse moves the bodies by less than the tolerance: what the impulse is short of it still counts by
 /// the speed that it leaves, until 1 % is left. Rows that close by less than the tolerance are as they should be.
 static void a_bound_below_the_tolerance_is_not_left_out(void **state)
@@ -203,6 +231,7 @@ int main(void)
         cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(the_law_of_sheets),
         cmocka_unit_test(a_bound_below_the_tolerance_is_not_left_out),
         cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
+        cmocka_unit_test(the_end_within_the_hull),
         cmocka_unit_test(a_velocity_that_is_no_number_is_not_solved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -331,6 +331,66 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
     bt_snapshot_free(&s);
 }
 
+/// Its last checkpoint after five steps, taken up from one in which one number is another; what that returns.
+static bt_status resumed_with(const bt_snapshot *from, const char *name, int64_t at, double value, bt_errors *err)
+{
+    char *dir = bt_text_copy(in_folder("run")), *changed = bt_text_copy(in_folder("run/changed.h5"));
+    bt_snapshot s = {0};
+    for (int k = 0; k < from->n; k++) {
+        const bt_item *i = &from->item[k];
+        bt_snapshot_add(&s, i->name, i->type, i->n, i->width, i->data);
+    }
+    const bt_item *i = bt_snapshot_find(&s, name);
+    if (!i || i->n * i->width <= at) fail_msg("%s: has no number %d to change", name, (int)at);
+    set_number(i, at, value);
+    must(write_checkpoint(&s, dir, "changed.h5", err), err);
+    bt_snapshot_free(&s);
+    const bt_run_options o = {
+        .dir = dir, .from = changed, .threads = 1, .quiet = true, .dump_step = -1, .max_steps = 5};
+    const bt_status status = bt_run_resume(&bt_comm_alone, &o, err);
+    free(changed);
+    free(dir);
+    return status;
+}
+
+/// What the loop of a run goes by. What is sound is gone on from: the wall time grows by that of the steps.
+static void numbers_of_a_run_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int64_t at;
+        double value;
+    } wrong[] = {{"run/unconverged_in_a_row", 0, -1}, {"run/unconverged_in_a_row", 0, 1e18},
+                 {"run/energy_limit", 0, -1},         {"run/frames_due", 0, -1},
+                 {"run/frames_due", 0, 1000},         {"stall/windows", 0, -1},
+                 {"clock/phases", 1, NAN},            {"clock/wall_time", 0, NAN},
+                 {"clock/wall_time", 0, INFINITY}};
+    bt_errors err = {0};
+    bt_snapshot s, later;
+    char *dir = bt_text_copy(in_folder("run"));
+    const bt_run_options o = {.dir = dir, .threads = 1, .quiet = true, .dump_step = -1, .max_steps = 10};
+    must(bt_run(&bt_comm_alone, &kept[0].c, &o, &err), &err);
+    must(bt_snapshot_read(&s, in_folder("run/checkpoint.h5"), &err), &err);
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        char wanted[80];
+        snprintf(wanted, sizeof wanted, "/%s", wrong[k].name);
+        const bt_status status = resumed_with(&s, wrong[k].name, wrong[k].at, wrong[k].value, &err);
+        if (status != BT_ERR_CASE || err.n != 1 || !strstr(err.text[0], wanted))
+            fail_msg("%s [%d] = %g: status %d, %zu messages: %s", wrong[k].name, (int)wrong[k].at, wrong[k].value,
+                     (int)status, err.n, err.n ? err.text[0] : "");
+        bt_errors_free(&err);
+    }
+    must(resumed_with(&s, "clock/wall_time", 0, 1000, &err), &err);
+    must(bt_snapshot_read(&later, in_folder("run/checkpoint.h5"), &err), &err);
+    const double wall = bt_snapshot_real(&later, "clock/wall_time");
+    assert_true(wall > 1000 && wall < 1600);
+    assert_int_equal(bt_snapshot_int(&later, "world/step"), 15);
+    bt_snapshot_free(&later);
+    bt_snapshot_free(&s);
+    free(dir);
+}
+
 /// A row that is wider than the room for it would be written beyond it.
 static void rows_of_another_width_are_refused(void **state)
 {
@@ -366,6 +426,7 @@ int main(void)
         cmocka_unit_test(contacts_out_of_order_are_refused),
         cmocka_unit_test(files_of_another_make_are_refused),
         cmocka_unit_test(a_checkpoint_without_a_case_is_refused),
+        cmocka_unit_test(numbers_of_a_run_are_refused_by_name),
         cmocka_unit_test(rows_of_another_width_are_refused),
     };
     const int failed = cmocka_run_group_tests(tests, make_states, free_states);

@@ -498,6 +498,52 @@ static void ice_that_overtakes_a_window_is_reported(void **state)
     }
 }
 
+/// A branch that parts and a programme that changes before the window, or beyond it, are no part of its mean.
+static void what_lies_beyond_the_window_does_not_judge_it(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    double before[] = {0, 0.5, 10, 0.5, 15, 1}, beyond[] = {0, 1, 61, 1, 70, 0.5};
+    bt_event event[] = {{.time = 10, .kind = BT_EVENT_LINE_BROKEN, .subject = 1, .value = 7}};
+    const bt_events events = {.event = event, .n = 1};
+    for (int k = 0; k < 3; k++) {
+        bt_case d = c;
+        bt_run_totals t = totals(600);
+        if (k == 0) d.tow.programme = before, d.tow.n_programme = 3;
+        if (k == 1) d.tow.programme = beyond, d.tow.n_programme = 3;
+        if (k == 2) t.events = &events;
+        char *json = summary_of(&d, 600, &t, FLOES, sound_tow);
+        if (strcmp(json_value(json, "verdict"), "\"steady\"")) fail_msg("%d: %s", k, json_value(json, "reason"));
+        free(json);
+    }
+}
+
+/// Floes that come back as they were count among those that fell behind, not among the places ahead.
+static void disturbed_ice_that_comes_back_is_reported(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    const bt_undisturbed ice = {.drift_x = -12};
+    static const struct {
+        int64_t renewed, kept, missed;
+        const char *warning;
+    } of[] = {{300, 100, 0, "25.0 % of the floes behind the moving window came back"},
+              {891, 9, 0, NULL},
+              {300, 0, 100, "25.0 % of the places at the front of the moving window stayed empty"}};
+    for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
+        bt_run_totals t = totals(600);
+        const bt_window window = {.sign = 1, .length = 40, .stride = 2, .renewed = of[k].renewed, .kept = of[k].kept,
+                                  .missed = of[k].missed};
+        t.window = &window, t.undisturbed = &ice;
+        char *json = summary_of(&c, 600, &t, FLOES, sound_tow);
+        if (of[k].warning && !strstr(json, of[k].warning)) fail_msg("not reported: %s in %s", of[k].warning, json);
+        assert_true((strstr(json, "came back ahead as they were") != NULL) == (of[k].kept == 100));
+        free(json);
+    }
+}
+
 /// Of the branches that a run has, the strongest, whichever it is.
 static void the_peak_tension_is_of_the_strongest_branch(void **state)
 {
@@ -523,6 +569,8 @@ int main(void)
         cmocka_unit_test(estimates_take_the_speed_of_the_window),
         cmocka_unit_test(a_body_that_met_no_ice_tells_nothing),
         cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
+        cmocka_unit_test(what_lies_beyond_the_window_does_not_judge_it),
+        cmocka_unit_test(disturbed_ice_that_comes_back_is_reported),
         cmocka_unit_test(a_few_collisions_are_few_samples),
         cmocka_unit_test(a_few_collisions_begin_no_window),
         cmocka_unit_test(contact_without_a_pause_may_be_few_samples),
