@@ -9,9 +9,9 @@ are named, and the exit code is 4, so that no script takes a part for the whole;
 import argparse
 from pathlib import Path
 
+import analysis
 import command
 import ensemble_text
-import findings
 import loads
 import soundness
 import statement
@@ -227,7 +227,7 @@ def statistics(e, options):
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
         "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
         "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
-        "convergence": findings.read("converge", e.path)
+        "convergence": analysis.read("converge", e.path)
     }
 
 
