@@ -12,6 +12,7 @@ from pathlib import Path
 
 import command
 import compared
+import stat_drift
 import style
 from bergtow_read import Run, RunError
 from text_table import quantity, scale, short
@@ -35,6 +36,7 @@ class Point:
     low: float            #: 95 % interval of the mean, N, NaN where the run gives none
     high: float
     steady: bool          #: the window is that of a steady tow
+    change: float         #: of the ice resistance over the window, N, NaN where the run does not say
     reference: float      #: N, measured, NaN without one
     unconverged: float    #: share of the steps
     warnings: int
@@ -74,6 +76,7 @@ def read(path):
                      low=low,
                      high=high,
                      steady=run.verdict[0] == "steady",
+                     change=run.number("window.series.ice_resistance.change_n"),
                      reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
                      warnings=len(run.summary.get("warnings") or []),
@@ -121,18 +124,9 @@ def once(points):
     return out
 
 
-def student(freedom, level=0.95):
-    """t of Student's distribution that so much of it lies within: t = sqrt(n) tan a turns its density into
-    cos^(n-1) a. For `make demo`, which installs no scipy."""
-    angle = np.linspace(0, np.pi / 2, 200_001)
-    density = np.cos(angle) ** (freedom - 1)
-    share = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
-    return np.sqrt(freedom) * np.tan(np.interp(level, share / share[-1], angle))
-
-
 def rows(points):
-    """One row a concentration: (asked, number of runs, how many are steady, mean, standard error, 95 % interval, ratio
-    and force of each estimate, worst share of steps missed).
+    """One row a concentration: (asked, number of runs, how many are steady, mean, drift of all (stat_drift.of), standard
+    error, 95 % interval, ratio and force of each estimate, worst share of steps missed).
 
     Of several runs: mean of the means, error and interval from their scatter. Of one: its own.
     """
@@ -143,7 +137,7 @@ def rows(points):
         se, low, high = some[0].se, some[0].low, some[0].high
         if len(some) > 1:
             se = means.std(ddof=1) / np.sqrt(len(some))
-            low, high = means.mean() + student(len(some) - 1) * np.array([-se, se])
+            low, high = stat_drift.interval(means)
         names = [name for name in some[0].estimates if all(name in p.estimates for p in some)]
         forces = {name: float(np.mean([p.estimates[name].force for p in some])) for name in names}
         valid, compares = ({name: all(getattr(p.estimates[name], what)
@@ -152,6 +146,7 @@ def rows(points):
                            for what in ("valid", "compares"))
         out.append({
             "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": means.mean(),
+            "drift": stat_drift.of([p.change for p in some], means.mean()),
             "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
             "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
         })
@@ -189,14 +184,24 @@ def words(points):
         return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
                          if row["valid"].get(name) and np.isfinite(row["forces"][name]))
 
+    def verdict(row):
+        n, steady = row["runs"], f"{row['steady']} of {row['runs']}"
+        if row["drift"] is None:
+            return f"{steady} tow{'s' if n > 1 else ''} steady"
+        change, _, moved = row["drift"]
+        if moved:
+            return (f"over all tows the load {'rises' if change > 0 else 'falls'} by {quantity(abs(change), 'N')} in "
+                    f"the window; {steady} steady by themselves")
+        return f"steady over all tows, and {steady} by themselves"
+
     lines = []
     for row in rows(points):
         factor, unit = scale([row["mean"]], "N")
         mean, low, high = (short(row[key] / factor) for key in ("mean", "low", "high"))
         held = f" (95 %: {low} to {high})" if np.isfinite(row["low"]) else ""
-        lines += [f"{100 * row['concentration']:.3g} % ice adds {mean} {unit}{held}: mean of {row['runs']} "
-                  f"tow{'s' if row['runs'] > 1 else ''}, {row['steady']} of them steady.",
-                  f"    Estimates meant for it: {of(points[0].of_ice, row) or 'none'}."]
+        lines += [f"{100 * row['concentration']:.3g} % ice adds {mean} {unit}{held}, the mean of {row['runs']} "
+                  f"tow{'s' if row['runs'] > 1 else ''}.", f"    Verdict: {verdict(row)}.",
+                  f"    Estimates: {of(points[0].of_ice, row) or 'none is meant for this ice'}."]
     on_top = of({name: e for name, e in points[0].estimates.items() if e.on_top}, row)
     return "\n".join(lines + ([f"Without ice: {on_top}."] if on_top else []))
 

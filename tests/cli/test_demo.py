@@ -45,8 +45,9 @@ def test_the_demo_answers_with_what_it_has_installed(tmp_path):
         (tmp_path / "hidden" / name).mkdir(parents=True)
         (tmp_path / "hidden" / name / "__init__.py").write_text(f"raise ImportError('{name} is hidden', name='{name}')")
     text = (ROOT / "cases/studies/demo.yml").read_text().replace("../fullscale", str(ROOT / "cases/fullscale"))
-    text = re.sub(r"(duration: )[^,]*", r"\g<1>15 min", text).replace("2.5 km", "1.3 km")
-    text = text.replace("window_start: 20 min", "window_start: 6 min").replace("repeats: 5", "repeats: 2")
+    for key, value in (("duration", "10 min"), ("length", "1 km"), ("width", "0.8 km"), ("window_start", "6 min"),
+                       ("repeats", "2")):
+        text = re.sub(rf"({key}: )[^,}}\n]*", rf"\g<1>{value}", text)
     (tmp_path / "study.yml").write_text(text)
     out = tmp_path / "out"
     done = call("ensemble", tmp_path / "study.yml", "-o", out)
@@ -58,7 +59,7 @@ def test_the_demo_answers_with_what_it_has_installed(tmp_path):
                               env=os.environ | {"PYTHONPATH": str(tmp_path / "hidden")})
         assert done.returncode == 0, (line, done.stderr)
     assert all((out / name).exists() for name in ("field.png", "replay.html", "resistance.png"))
-    answer = re.findall(r"^(\d+) % ice adds \S+ kN \(95 %: \S+ to \S+\): mean of 2 tows", done.stdout, re.M)
+    answer = re.findall(r"^(\d+) % ice adds \S+ kN \(95 %: \S+ to \S+\), the mean of 2 tows", done.stdout, re.M)
     assert answer == ["20", "50", "80"] and "Without ice: open-water drag" in done.stdout
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""postproc/plot_resistance.py: points, curves and table of made-up runs, and what it refuses."""
+"""postproc/plot_resistance.py: points, curves, table and words of made-up runs, and what it refuses."""
 import json
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
@@ -11,6 +12,7 @@ from harness import DONE, call, changed, script, write_case
 from test_postproc import done, make_run, pixels, where
 
 import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
+import stat_drift  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
@@ -105,23 +107,35 @@ def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
 
 def test_the_factor_of_an_interval_is_students():
     for freedom in (1, 2, 3, 4, 9, 19, 99, 2000):
-        assert plot_resistance.student(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-6)
-    assert plot_resistance.student(4, 0.5) == pytest.approx(stats.t.ppf(0.75, 4), rel=1e-6)
+        assert stat_drift.student(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-6)
+    assert stat_drift.student(4, 0.5) == pytest.approx(stats.t.ppf(0.75, 4), rel=1e-6)
 
 
-def test_the_words_have_means_intervals_and_estimates(runs, tmp_path):
+def test_the_words_have_means_intervals_verdicts_and_estimates(runs, tmp_path):
     """Red: the interval of several tows by 1.96; an estimate outside its range; of a tow alone that of all."""
     result = script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--words")
     path, empty, *said = result.stdout.splitlines()
     assert result.returncode == 0 and path == str(tmp_path / "r.png") and not empty
-    assert said[0] == "10 % ice adds 2.00 kN (95 %: 0.0400 to 3.96): mean of 1 tow, 1 of them steady."
-    assert said[2] == "50 % ice adds 50.0 kN (95 %: -77.1 to 177): mean of 2 tows, 2 of them steady."
+    assert said[0] == "10 % ice adds 2.00 kN (95 %: 0.0400 to 3.96), the mean of 1 tow."
+    assert said[1] == "    Verdict: 1 of 1 tow steady."
+    assert said[3] == "50 % ice adds 50.0 kN (95 %: -77.1 to 177), the mean of 2 tows."
     estimates = plot_resistance.read(runs[3]).of_ice
     meant = [e.label for e in estimates.values() if e.valid]
     assert 0 < len(meant) < len(estimates)
-    assert [e.label for e in estimates.values() if e.label in said[5]] == meant and "Estimates meant for it" in said[5]
+    assert [e.label for e in estimates.values() if e.label in said[8]] == meant and "Estimates: " in said[8]
     drag = next(e for e in plot_resistance.read(runs[0]).estimates.values() if e.on_top)
-    assert said[6] == f"Without ice: {drag.label} {drag.force / 1e3:.0f} kN." and len(said) == 7
+    assert said[9] == f"Without ice: {drag.label} {drag.force / 1e3:.0f} kN." and len(said) == 10
+
+
+def test_the_verdict_of_five_tows_is_that_of_all(runs):
+    """Red: of single tows alone, some of which change by chance."""
+    point = plot_resistance.read(runs[1])
+    for changes, expected in (((-9e3, 8e3, -5e3, 6e3, 1e3), "steady over all tows, and 4 of 5 by themselves"),
+                              ((9e3, 8e3, 5e3, 6e3, 7e3), "over all tows the load rises by 7.00 kN in the window; "
+                                                          "4 of 5 steady by themselves"),
+                              ((-9e3, 8e3, -5e3, 6e3), "3 of 4 tows steady")):
+        tows = [replace(point, change=change, steady=k > 0) for k, change in enumerate(changes)]
+        assert plot_resistance.words(tows).splitlines()[1] == f"    Verdict: {expected}."
 
 
 def test_tows_of_other_length_are_no_other_case(runs):
