@@ -85,7 +85,7 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 EXTENDED := $(BUILD)/tests/examples/extended
 
 .PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-long deps-lint deps-dev \
-        deps-docs docs demo report bench fullscale partition-study validation test test-long mutate lint tidy \
+        deps-docs docs demo report bench fullscale partition-study validation test test-long mutate findings lint tidy \
         validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
@@ -253,15 +253,16 @@ deps-demo: ## install what make demo needs: neither MPI nor scipy
 	@$(MAKE) --no-print-directory deps DEPS='$(DEPS_DEMO)'
 
 DEMO := out/demo
-demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
-	@echo "now the program is built, the iceberg towed and its report written: about a minute"
+FIELD := $(DEMO)/members/c003-r001
+demo: deps-demo ## resistance of an iceberg in 20, 50 and 80 % ice: the answer, its picture, a replay: 100 s
+	@echo "now the program is built, and the iceberg towed through 15 ice fields: 100 s on two cores"
 	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
-	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
-	$(PYTHON) postproc/plot_force.py $(DEMO)
-	$(PYTHON) postproc/plot_field.py $(DEMO)
-	$(PYTHON) postproc/report.py $(DEMO)
-	@echo "pictures:"; ls $(DEMO)/*.png
-	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
+	build/release/bergtow ensemble cases/studies/demo.yml -o $(DEMO)
+	$(PYTHON) postproc/plot_field.py $(FIELD) -o $(DEMO)/field.png
+	$(PYTHON) postproc/report.py $(FIELD) -o $(DEMO)/replay.html
+	$(PYTHON) postproc/plot_resistance.py $(DEMO)/members/* -o $(DEMO)/resistance.png --words
+	@echo "picture of it: $(DEMO)/resistance.png; one field of 80 % with a replay: $(DEMO)/replay.html"
+	@echo "tows that are done are kept; remove $(DEMO) for new ones"
 
 RUN ?=
 report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
@@ -322,6 +323,11 @@ validation: deps ## the comparisons of cases/validation: tables, pictures in out
 	$(PYTHON) cases/validation/arching.py
 	$(PYTHON) cases/validation/barrier.py
 	$(PYTHON) cases/validation/ship.py
+
+FINDINGS := $(filter-out findings/packages.sh,$(wildcard findings/*.sh))
+findings: ## surprises of other software, each seen once more (findings/README.md): minutes, needs apt-get
+	@failed=; for f in $(FINDINGS); do echo "$$f"; $$f || failed="$$failed $$f"; done; \
+	[ -z "$$failed" ] || { echo "another output than before:$$failed"; exit 1; }
 
 lint: all ## names of external symbols, licence lines, length of lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh

@@ -13,9 +13,9 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import analysis
 import command  # first: it has words for packages that are missing
 import compared
-import findings
 import loads
 import stat_budget
 import stat_load
@@ -171,8 +171,8 @@ def of_all(e, some, converge):
 
 def read_converge(path, folder):
     if path is None:
-        return findings.read("converge", folder)
-    found = findings.read("converge", path)
+        return analysis.read("converge", folder)
+    found = analysis.read("converge", path)
     if not isinstance(found, dict) or "rows" not in found:
         raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
     return found
@@ -189,14 +189,14 @@ def main(argv=None):
                    f"scale; may be repeated (default: {', '.join(OF)})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
                    "computation adds")
-    findings.add_options(p, BUDGET)
+    analysis.add_options(p, BUDGET)
     a = p.parse_args(argv)
     folder = a.output or Path("out") / a.study.stem
-    findings.begin("budget", a.study, "study", folder, a.force)
+    analysis.begin("budget", a.study, "study", folder, a.force)
     run_members(program(), a.study, folder, a.set, a.jobs, 60 * a.budget)
     e = Ensemble(folder)
     found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
-    findings.keep("budget", found, folder, a.force)
+    analysis.keep("budget", found, folder, a.force)
     if found["failed"]:
         raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
                        "budget is without the values that they have", "mend what made them fail, or narrow the ranges; "

@@ -21,11 +21,11 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import analysis
 import command  # first: it has words for packages that are missing
 import bracket
 import compared
 import domain_width
-import findings
 import stat_mean
 import units
 from bergtow_read import CASE, USAGE, Run, RunError, case_value, parse_case, within
@@ -320,7 +320,7 @@ def arguments(argv):
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
     domain_width.add_option(p)
-    findings.add_options(p, BUDGET)
+    analysis.add_options(p, BUDGET)
     a = p.parse_args(argv)
     for name, k in (("start", 0), ("end", 1)):
         if getattr(a, name) is None:
@@ -337,7 +337,7 @@ def arguments(argv):
 def main(argv=None):
     a = arguments(argv)
     folder = a.output or Path("out") / f"capability-{a.case.stem}"
-    findings.begin("capability", a.case, "case", folder, a.force)
+    analysis.begin("capability", a.case, "case", folder, a.force)
     began, binary = time.monotonic(), program()
     case = resolved(binary, a.case, a.set)
     check(case, a.search)
@@ -387,7 +387,7 @@ def main(argv=None):
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]
     }
-    findings.keep("capability", found, folder, a.force)
+    analysis.keep("capability", found, folder, a.force)
     runs.tell_failed()
 
 

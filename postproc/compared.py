@@ -87,9 +87,13 @@ def _differ(a, b):
 
 
 def unlike(a, b, but=()):
-    """(key, its text in a, in b) of what makes another case of b: keys that both have, `but` these."""
+    """(key, its text in a, in b) of what makes another case of b: keys that both have, `but` these. Where neither has a
+    lead, its extent, which follows from the tow, makes none."""
+    physical = PHYSICAL
+    if a.get("lead.mode") == b.get("lead.mode") == "none":
+        physical = tuple(key for key in PHYSICAL if key != "lead.")
     for key, value in a.items():
-        if (key.startswith(PHYSICAL) or key == "run.dt") and key not in (*PLACES, *but) and key in b \
+        if (key.startswith(physical) or key == "run.dt") and key not in (*PLACES, *but) and key in b \
                 and _differ(value, b[key]):
             yield key, value, b[key]
 

@@ -27,8 +27,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import analysis
 import command
-import findings
 import stat_mean
 from bergtow_read import SIGNAL, USAGE, Run, RunError, within
 from case_runs import SPENT, CaseRuns, above_zero, checked, locked, program, whole_from
@@ -326,10 +326,10 @@ def main(argv=None):
                    help="relative effect that does not matter (default 0.1)")
     p.add_argument("--tries", type=whole_from(1, 5), default=TRIES, metavar="K",
                    help="values of a quantity after each other, where the first change matters (default 3)")
-    findings.add_options(p, BUDGET)
+    analysis.add_options(p, BUDGET)
     a = p.parse_args(argv)
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
-    findings.begin("converge", a.case, "case", folder, a.force)
+    analysis.begin("converge", a.case, "case", folder, a.force)
     checked(program(), a.case, a.set)
     study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, a.jobs, began + 60 * a.budget,
                      began + 60 * a.budget)
@@ -342,7 +342,7 @@ def main(argv=None):
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,
              "verdicts": verdicts(study), "budget_min": a.budget, "looks": LOOKS,
              "spent_min": (time.monotonic() - began) / 60, "rows": rows}
-    findings.keep("converge", found, folder, a.force)
+    analysis.keep("converge", found, folder, a.force)
     study.tell_failed()
 
 

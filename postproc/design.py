@@ -23,9 +23,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import analysis
 import command
 import domain_width
-import findings
 import pdf
 import report
 from bergtow_read import SIGNAL, Run, RunError
@@ -270,7 +270,7 @@ def main(argv=None):
     if not a.no_pdf:
         pdf.browser()
     made = ["report.html"] + ["report.pdf"] * (not a.no_pdf)
-    findings.also(a.also)
+    analysis.also(a.also)
     for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         command.may_write(a.output / name, a.force)
     if not study:

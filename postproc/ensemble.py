@@ -9,11 +9,12 @@ are named, and the exit code is 4, so that no script takes a part for the whole;
 import argparse
 from pathlib import Path
 
+import analysis
 import command
 import ensemble_text
-import findings
 import loads
 import soundness
+import stat_drift
 import statement
 import stat_extreme
 import stat_fit
@@ -25,8 +26,6 @@ from text_table import scale, short
 
 import numpy as np
 
-LEAST_DRIFT = 5  # fields
-MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/output/steady.h
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
 
 
@@ -112,21 +111,18 @@ def extremes(e, rows, options):
 
 
 def drift(e, rows, mean):
-    """Does the mean of all fields change over the window? From the line through each member's ice resistance, which one
-    run alone may not tell from its noise."""
-    change = np.array([e.number("window_series_ice_resistance_change_n", m) for m in rows if not e.cut(m)])
-    change = change[np.isfinite(change)]
-    if len(change) < LEAST_DRIFT:
+    """Does the mean of all fields change over the window (stat_drift.py)?"""
+    found = stat_drift.of([e.number("window_series_ice_resistance_change_n", m) for m in rows if not e.cut(m)], mean)
+    if found is None:
         return {"verdict": "not judged", "words": "too few fields, or results of an earlier version"}
-    low, high = stat_mean.t_interval(change)
-    factor, unit = scale([abs(change.mean())], "N")
-    moved = (low > 0 or high < 0) and abs(change.mean()) > MATERIAL * abs(mean)
+    change, (low, high), moved = found
+    factor, unit = scale([abs(change)], "N")
     words = (
-        f"{'rises' if change.mean() > 0 else 'falls'} by {short(abs(change.mean()) / factor)} {unit} "
+        f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} "
         f"(95 %: {short(min(abs(low), abs(high)) / factor)} to {short(max(abs(low), abs(high)) / factor)})"
     ) if moved else "no drift"
     return {
-        "verdict": "not steady" if moved else "steady", "change": change.mean(), "change_95": (low, high),
+        "verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high),
         "words": words
     }
 
@@ -227,7 +223,7 @@ def statistics(e, options):
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
         "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
         "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
-        "convergence": findings.read("converge", e.path)
+        "convergence": analysis.read("converge", e.path)
     }
 
 

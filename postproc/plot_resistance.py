@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Mean ice resistance of one or several runs against the concentration, beside the estimates; the same as a table.
+"""Mean ice resistance of one or several runs against the concentration, beside the estimates; the same as a table, and
+in words.
 
-Runs of one concentration (other seeds) are drawn one by one, and stand in the table as their mean.
+Runs of one concentration (other seeds) are drawn one by one, with their mean and its 95 % interval over them, and stand
+in the table as their mean.
 """
 import argparse
 import sys
@@ -10,8 +12,10 @@ from pathlib import Path
 
 import command
 import compared
+import stat_drift
 import style
 from bergtow_read import Run, RunError
+from text_table import quantity, scale, short
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,6 +36,7 @@ class Point:
     low: float            #: 95 % interval of the mean, N, NaN where the run gives none
     high: float
     steady: bool          #: the window is that of a steady tow
+    change: float         #: of the ice resistance over the window, N, NaN where the run does not say
     reference: float      #: N, measured, NaN without one
     unconverged: float    #: share of the steps
     warnings: int
@@ -71,6 +76,7 @@ def read(path):
                      low=low,
                      high=high,
                      steady=run.verdict[0] == "steady",
+                     change=run.number("window.series.ice_resistance.change_n"),
                      reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
                      warnings=len(run.warnings),
@@ -119,16 +125,19 @@ def once(points):
 
 
 def rows(points):
-    """One row a concentration: (asked, number of runs, mean, standard error, ratio and force of each estimate, worst
-    share of steps missed).
+    """One row a concentration: (asked, number of runs, how many are steady, mean, drift of all (stat_drift.of), standard
+    error, 95 % interval, ratio and force of each estimate, worst share of steps missed).
 
-    Of several runs: mean of the means, standard error from their scatter. Of one: its own.
+    Of several runs: mean of the means, error and interval from their scatter. Of one: its own.
     """
     out = []
     for asked in sorted({p.asked for p in points}):
         some = [p for p in points if p.asked == asked]
         means = np.array([p.mean for p in some])
-        se = means.std(ddof=1) / np.sqrt(len(some)) if len(some) > 1 else some[0].se
+        se, low, high = some[0].se, some[0].low, some[0].high
+        if len(some) > 1:
+            se = means.std(ddof=1) / np.sqrt(len(some))
+            low, high = stat_drift.interval(means)
         names = [name for name in some[0].estimates if all(name in p.estimates for p in some)]
         forces = {name: float(np.mean([p.estimates[name].force for p in some])) for name in names}
         valid, compares = ({name: all(getattr(p.estimates[name], what)
@@ -136,9 +145,10 @@ def rows(points):
                             for name in names}
                            for what in ("valid", "compares"))
         out.append({
-            "concentration": asked, "runs": len(some), "mean": means.mean(), "se": se, "forces": forces, "valid": valid,
-            "compares": compares, "unconverged": max(p.unconverged for p in some),
-            "warnings": sum(p.warnings for p in some)
+            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": means.mean(),
+            "drift": stat_drift.of([p.change for p in some], means.mean()),
+            "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
+            "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
         })
     return out
 
@@ -165,6 +175,35 @@ def table(points):
         cells += [f"{100 * row['unconverged']:.2g} %", str(row["warnings"])]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def words(points):
+    """The rows as sentences: what the ice of each concentration adds, and the estimates meant for it; at last what open
+    water takes."""
+    def of(estimates, row):
+        return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
+                         if row["valid"].get(name) and np.isfinite(row["forces"][name]))
+
+    def verdict(row):
+        n, steady = row["runs"], f"{row['steady']} of {row['runs']}"
+        if row["drift"] is None:
+            return f"{steady} tow{'s' if n > 1 else ''} steady"
+        change, _, moved = row["drift"]
+        if moved:
+            return (f"over all tows the load {'rises' if change > 0 else 'falls'} by {quantity(abs(change), 'N')} in "
+                    f"the window; {steady} steady by themselves")
+        return f"steady over all tows, and {steady} by themselves"
+
+    lines = []
+    for row in rows(points):
+        factor, unit = scale([row["mean"]], "N")
+        mean, low, high = (short(row[key] / factor) for key in ("mean", "low", "high"))
+        held = f" (95 %: {low} to {high})" if np.isfinite(row["low"]) else ""
+        lines += [f"{100 * row['concentration']:.3g} % ice adds {mean} {unit}{held}, the mean of {row['runs']} "
+                  f"tow{'s' if row['runs'] > 1 else ''}.", f"    Verdict: {verdict(row)}.",
+                  f"    Estimates: {of(points[0].of_ice, row) or 'none is meant for this ice'}."]
+    on_top = of({name: e for name, e in points[0].estimates.items() if e.on_top}, row)
+    return "\n".join(lines + ([f"Without ice: {on_top}."] if on_top else []))
 
 
 def draw_estimates(axes, points, factor):
@@ -202,7 +241,7 @@ def draw_estimates(axes, points, factor):
 
 def limits(points, log):
     """Lower and upper end of the force axis, N: the runs, and the estimates that are meant for what was run."""
-    seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)]
+    seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
     for p in points:
         for e in p.of_ice.values():
             if e.valid and e.force:
@@ -219,8 +258,10 @@ def limits(points, log):
 
 
 def draw_runs(axes, points, factor, low, log):
-    """The runs with their intervals, means of several and what was measured; returns how many have no place in the
-    picture."""
+    """The runs, each with its interval where it is alone at its concentration, means of several with theirs, and what
+    was measured; returns how many have no place in the picture."""
+    averaged = [r for r in rows(points) if r["runs"] > 1]
+    alone = np.array([not any(p.asked == r["concentration"] for r in averaged) for p in points])
     a = np.array([p.concentration for p in points])
     mean = np.array([p.mean for p in points])
     below, above = (np.nan_to_num(np.array(x))
@@ -228,8 +269,8 @@ def draw_runs(axes, points, factor, low, log):
     steady = np.array([p.steady for p in points])
     shown = mean > 0 if log else np.full(len(mean), True)
     below = np.minimum(below, mean - low / 2) if log else below
-    for which, face, label in ((steady, style.ICE, "simulated, 95 % of the run's mean"),
-                               (~steady, style.PAPER, "window not steady or too short")):
+    for which, face, label in ((steady & alone, style.ICE, "simulated, 95 % of the run's mean"),
+                               (~steady & alone, style.PAPER, "window not steady or too short")):
         which = which & shown
         if which.any():
             axes.errorbar(a[which],
@@ -243,16 +284,25 @@ def draw_runs(axes, points, factor, low, log):
                           linewidth=1.4,
                           zorder=5,
                           label=label)
-    averaged = [r for r in rows(points) if r["runs"] > 1]
+    for which, face, label in ((steady & ~alone, style.ICE, "simulated, a tow"),
+                               (~steady & ~alone, style.PAPER, "a tow, not steady or too short")):
+        which = which & shown
+        if which.any():
+            axes.plot(a[which], mean[which] / factor, "o", color=style.ICE, markerfacecolor=face, markersize=4,
+                      alpha=0.6, zorder=4, label=label)
     if averaged:
-        axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged],
-                  marker="_",
-                  markersize=22,
-                  markeredgewidth=2.5,
-                  linestyle="none",
-                  color=style.INK,
-                  zorder=6,
-                  label="mean of the seeds")
+        centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
+        reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
+        axes.errorbar([r["concentration"] for r in averaged],
+                      centre / factor,
+                      yerr=np.array([np.maximum(reach, 0), high_end - centre]) / factor,
+                      fmt="s",
+                      color=style.INK,
+                      markersize=5,
+                      capsize=5,
+                      linewidth=1.8,
+                      zorder=6,
+                      label="mean of the tows, 95 % (t)")
     measured = [p for p in points if np.isfinite(p.reference)]
     if measured:
         axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured],
@@ -309,7 +359,8 @@ def draw(points, log=True):
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(which="major")
     handles, labels, lost = style.legend_of(axes)
-    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("simulated"))
+    ours = ("simulated", "mean of the tows", "a tow", "window", "measured")
+    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith(ours))
     axes.legend([handles[i] for i in order], [labels[i] for i in order],
                 loc="upper left",
                 bbox_to_anchor=(1.02, 1.0),
@@ -334,6 +385,7 @@ def main(argv=None):
                    help="file to write (default: resistance.png beside the first RUN)")
     p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
+    p.add_argument("--words", action="store_true", help="also print the numbers as sentences")
     command.add_force(p)
     a = p.parse_args(argv)
     path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
@@ -346,6 +398,8 @@ def main(argv=None):
     if a.table:
         command.write_markdown(table(points), a.table, a.force)
         print(a.table)
+    if a.words:
+        print(f"\n{words(points)}")
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ import hashlib
 from datetime import datetime, timezone
 from pathlib import Path
 
+import analysis
 import command
-import findings
 import pdf
 import report_run
 import vector
@@ -118,7 +118,7 @@ def pages(folder, paths, a):
     # the second alone: it has only just begun
     if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         import report_ensemble  # and with it the statistics, which a run has no need of
-        findings.also(a.also)
+        analysis.also(a.also)
         template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, a.also)
     else:
         if a.also:

@@ -11,10 +11,10 @@ import sys
 from dataclasses import replace
 from itertools import groupby
 
+import analysis
 import compared
 import ensemble
 import ensemble_text
-import findings
 import loads
 import loads_text
 import plot_design
@@ -294,7 +294,7 @@ def parts(found, drawn):
 
 
 def of_part(name, part):
-    """(heading, blocks) of a chapter of findings.py."""
+    """(heading, blocks) of a chapter of analysis.py."""
     figure = part.get("figure")
     drawn = report_run.picture(name, part["heading"], figure) if figure else None
     return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
@@ -324,12 +324,12 @@ def doubt(name, found, folder, texts):
 
 
 def results_beside(e, also):
-    """{name: what a command of findings.py left in the first of the folders that has it, with "doubt"}; folders: that
+    """{name: what a command of analysis.py left in the first of the folders that has it, with "doubt"}; folders: that
     of the ensemble, and others."""
     texts, out = compared.cases(e), {}
-    for name in findings.KINDS:
+    for name in analysis.KINDS:
         for folder in (e.path, *also):
-            found = findings.read(name, folder)
+            found = analysis.read(name, folder)
             if found is not None:
                 out[name] = found | {"doubt": doubt(name, found, folder, texts)}
                 break
@@ -339,9 +339,9 @@ def results_beside(e, also):
 def beside(results):
     """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
     out = []
-    for name, (heading, _) in findings.KINDS.items():
+    for name, (heading, _) in analysis.KINDS.items():
         if name in results:
-            out.append(of_part(name, findings.chapter(name, results[name])))
+            out.append(of_part(name, analysis.chapter(name, results[name])))
         elif name in NOT_STUDIED:
             out.append((heading, [lines(NOT_STUDIED[name])]))
     return out

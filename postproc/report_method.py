@@ -210,7 +210,7 @@ def _convergence(found, e):
 
 
 def beyond(results, e):
-    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py. e: Ensemble."""
+    """Rows (what, value) of what other commands found, for the answer: {name: found} of analysis.py. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: MIT
 """Blind prediction of the ice resistance of a ship model in plastic floes; see README.md.
 
-    ship.py               every run of README.md, its table (ship.md) and the picture (ship.png)
+    ship.py               every run of the prediction, its table (ship.md) and the picture (ship.png)
+    ship.py --map FILE    the same ship in the ice that was there: along lanes of the map in FILE, and through made ice
+                          with the spread of its sizes (map.md); nrc_outlines.py says where FILE is from
 
 Friction is not known, of floes and hull alike: the prediction is a band over it. Rows below the band change one other
 assumption at a time, at the friction of ship.yml.
 """
 import json
+import subprocess
+import sys
+from pathlib import Path
 
-from points import ended, every, parser
+import nrc_outlines
+from points import ROOT, ended, every, parser
 
 import command  # points has set the path
 import style
@@ -27,6 +33,10 @@ OTHERS = {
     "no side walls": {"domain__sides": "periodic"},
     "half the time step": {"run__dt": "0.05 s"},
 }
+#: frictions of the floes that were there
+MEASURED = (0.05, 0.15, 0.35)
+MAP_LENGTH, MAP_WIDTH = 23.0, 7.0  # m, the strip with open water at both ends of its ice
+LANES = (-2.2, -1.1, 0.0, 1.1, 2.2)  # m: places of the ship across the map, three of its widths apart
 SECOND = 1.0  # s: the standard deviation is also given of means over that time, which depend less on the time step
 
 
@@ -52,6 +62,29 @@ def jobs(fields):
              for mu in FRICTIONS for seed in range(1, fields + 1)]
     return found + [(label, f"{label.replace(' ', '-')}-s{seed}", {"ice__seed": seed, **more})
                     for label, more in OTHERS.items() for seed in range(1, fields + 1)]
+
+
+def jobs_of_map(a):
+    """[(label, name, keys)] of the map a.map, from both of its ends, and of ice made with the spread of its sizes.
+    Errors: nrc_outlines.Refused, OSError, CalledProcessError."""
+    rings = nrc_outlines.outlines(nrc_outlines.read(a.map.read_bytes()))
+    todo = []
+    for name, turned in (("there", rings), ("back", [[MAP_LENGTH, 0.0] - ring for ring in rings])):
+        raw, floes = a.out / f"{name}-as-read.geojson", a.out / f"{name}.geojson"
+        nrc_outlines.write(turned, raw)
+        subprocess.run([sys.executable, ROOT / "postproc/outlines.py", raw, "-o", floes, "--centre", "0,0", "--force"],
+                       check=True, stdout=subprocess.DEVNULL)
+        keys = {"ice__outlines": floes.resolve(), "ice__nonconvex": "split", "domain__length": f"{MAP_LENGTH} m",
+                "domain__width": f"{MAP_WIDTH} m", "ice__seed": 1}
+        cases = [(f"map, friction {mu:.2f}", f"f{mu:.2f}", {"ice__friction": mu}) for mu in MEASURED]
+        cases += [("map, no end walls", "open", {"domain__ends": "open"})]
+        todo += [(label, f"{name}{lane:+g}-{short}", keys | {"body__y": lane} | more)
+                 for label, short, more in cases for lane in LANES]
+    # longer, so that no large floe is pressed on the end wall
+    sizes = {"ice__size_law": "lognormal", "ice__size_spread": 0.77, "domain__length": "24 m"}
+    made = [(f"sizes as measured, friction {mu:.2f}", f"sizes-f{mu:.2f}-s{seed}",
+             sizes | {"ice__friction": mu, "ice__seed": seed}) for mu in MEASURED for seed in range(1, a.fields + 1)]
+    return sorted(todo, key=lambda job: job[0]) + made
 
 
 def point(runs):
@@ -112,19 +145,26 @@ def draw(points, groups):
 
 @ended
 def main(argv=None):
-    a = parser("Blind prediction of a ship model's resistance in plastic floes.", "ship", 20).parse_args(argv)
-    todo = jobs(a.fields)
+    p = parser("Blind prediction of a ship model's resistance in plastic floes.", "ship", 20)
+    p.add_argument("--map", type=Path, metavar="FILE", help="demo_NRC_OEB_data.pkl: the runs in the ice of this map")
+    a = p.parse_args(argv)
+    try:
+        todo = jobs_of_map(a) if a.map else jobs(a.fields)
+    except (nrc_outlines.Refused, OSError) as error:
+        p.error(f"{a.map}: {error}; name the file as it is published")
     results = every(a, [(name, values) for _, name, values in todo], resistance)
     groups = {}
     for (label, _, _), result in zip(todo, results):
         groups.setdefault(label, []).append(result)
     points = {label: point(runs) for label, runs in groups.items()}
-    (a.out / "ship.json").write_text(json.dumps(groups), encoding="utf-8")
-    text = table(points)
-    (a.out / "ship.md").write_text(text + "\n", encoding="utf-8")
-    command.save(draw(points, groups), a.out / "ship.png", force=True)
+    name, text = "map" if a.map else "ship", table(points)
+    (a.out / f"{name}.json").write_text(json.dumps(groups), encoding="utf-8")
+    (a.out / f"{name}.md").write_text(text + "\n", encoding="utf-8")
+    if not a.map:
+        command.save(draw(points, groups), a.out / "ship.png", force=True)
     print(f"\n{text}\n\nsteps not converged: {sum(p['unconverged'] for p in points.values())}")
-    print("estimates that hold:", groups["friction 0.15"][0]["estimates"])
+    if not a.map:
+        print("estimates that hold:", groups["friction 0.15"][0]["estimates"])
 
 
 if __name__ == "__main__":

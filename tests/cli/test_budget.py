@@ -16,10 +16,10 @@ from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
+import analysis  # noqa: E402
 import budget  # noqa: E402
 import budget_text  # noqa: E402
 import compared  # noqa: E402
-import findings  # noqa: E402
 import stat_budget  # noqa: E402
 import stat_load  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
@@ -394,7 +394,7 @@ def test_a_study_end_to_end(small):
     seconds = json.loads((member / "summary.json").read_text())["window"]
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
-    block = findings.chapter("budget", findings.read("budget", folder / "out"))
+    block = analysis.chapter("budget", analysis.read("budget", folder / "out"))
     assert "\n\n| part |" in f"\n\n{block['markdown']}" and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}

@@ -19,6 +19,7 @@ from harness import BERGTOW, TOW, call, changed, script, write_case
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
 
+import analysis  # noqa: E402
 import animate  # noqa: E402
 import budget  # noqa: E402
 import capability  # noqa: E402
@@ -26,7 +27,6 @@ import command  # noqa: E402
 import converge  # noqa: E402
 import design  # noqa: E402
 import ensemble  # noqa: E402
-import findings  # noqa: E402
 import outlines  # noqa: E402
 import plot_chains  # noqa: E402
 import plot_ensemble  # noqa: E402
@@ -100,7 +100,7 @@ def quick(places, tmp_path, monkeypatch):
                                  tow__line__breaking_load=1e5), "line.yml")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     monkeypatch.setattr(converge, "converge", work_of(tmp_path / "converge.json"))
-    monkeypatch.setattr(findings.converge_text, "text", lambda _: "")
+    monkeypatch.setattr(analysis.converge_text, "text", lambda _: "")
     monkeypatch.setattr(report_run, "pictures", lambda _: [])
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     return {"RUN": str(places / "run"), "ALL": str(places / "all")}

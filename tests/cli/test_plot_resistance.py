@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""postproc/plot_resistance.py: points, curves and table of made-up runs, and what it refuses."""
+"""postproc/plot_resistance.py: points, curves, table and words of made-up runs, and what it refuses."""
 import json
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
 import pytest
+from scipy import stats
 
 from harness import DONE, call, changed, script, write_case
 from test_postproc import done, make_run, pixels, where
 
 import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
+import stat_drift  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
@@ -62,13 +65,16 @@ def test_the_picture_has_points_bars_and_curves(runs):
         drawn = np.isfinite(y)
         assert np.array_equal(drawn, (a >= low) & (a <= high) & (force > 0)), name
         assert np.allclose(y[drawn] * scale, force[drawn], rtol=1e-12), name
-    [bars] = axes.containers
-    assert list(bars[0].get_xdata()) == [0.1, 0.5, 0.5, 0.95]
-    assert np.allclose(bars[0].get_ydata(), [2, 40, 60, 800])
-    top = [segment[1][1] for segment in bars[2][0].get_segments()]
-    assert np.allclose(top, [2 + 1.96, 40 + 1.96, 60 + 1.96, 800 + 1.96])
-    mean = lines["mean of the seeds"]
-    assert list(mean.get_xdata()) == [0.5] and np.allclose(mean.get_ydata(), [50])
+    alone, averaged = axes.containers
+    assert list(alone[0].get_xdata()) == [0.1, 0.95] and np.allclose(alone[0].get_ydata(), [2, 800])
+    top = [segment[1][1] for segment in alone[2][0].get_segments()]
+    assert np.allclose(top, [2 + 1.96, 800 + 1.96])
+    assert list(averaged[0].get_xdata()) == [0.5] and np.allclose(averaged[0].get_ydata(), [50])
+    [[(_, low), (_, high)]] = averaged[2][0].get_segments()
+    assert np.isclose(high, 50 + 12.706 * 10, rtol=1e-4), "t of one degree of freedom, standard error 10"
+    assert 0 < low < 1, "an interval below zero ends below the picture"
+    tows = lines["simulated, a tow"]
+    assert list(tows.get_xdata()) == [0.5, 0.5] and np.allclose(tows.get_ydata(), [40, 60])
     low, high = axes.get_ylim()
     assert axes.get_yscale() == "log" and 0.04 - 1e-9 < low < 2 and 800 < high < 8000
     least = points[1].estimates["lichey_hellmer"].force  # the smallest of what is meant for 50 %
@@ -98,6 +104,50 @@ def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
     picture = pixels(tmp_path / "r.png")
     for colour in (style.ICE, style.TOW, style.INERTIA, style.DRAG):
         assert len(where(picture, colour)[0]) > 100
+
+
+def test_the_factor_of_an_interval_is_students():
+    for freedom in (1, 2, 3, 4, 9, 19, 99, 2000):
+        assert stat_drift.student(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-6)
+    assert stat_drift.student(4, 0.5) == pytest.approx(stats.t.ppf(0.75, 4), rel=1e-6)
+
+
+def test_the_words_have_means_intervals_verdicts_and_estimates(runs, tmp_path):
+    """Red: the interval of several tows by 1.96; an estimate outside its range; of a tow alone that of all."""
+    result = script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--words")
+    path, empty, *said = result.stdout.splitlines()
+    assert result.returncode == 0 and path == str(tmp_path / "r.png") and not empty
+    assert said[0] == "10 % ice adds 2.00 kN (95 %: 0.0400 to 3.96), the mean of 1 tow."
+    assert said[1] == "    Verdict: 1 of 1 tow steady."
+    assert said[3] == "50 % ice adds 50.0 kN (95 %: -77.1 to 177), the mean of 2 tows."
+    estimates = plot_resistance.read(runs[3]).of_ice
+    meant = [e.label for e in estimates.values() if e.valid]
+    assert 0 < len(meant) < len(estimates)
+    assert [e.label for e in estimates.values() if e.label in said[8]] == meant and "Estimates: " in said[8]
+    drag = next(e for e in plot_resistance.read(runs[0]).estimates.values() if e.on_top)
+    assert said[9] == f"Without ice: {drag.label} {drag.force / 1e3:.0f} kN." and len(said) == 10
+
+
+def test_the_verdict_of_five_tows_is_that_of_all(runs):
+    """Red: of single tows alone, some of which change by chance."""
+    point = plot_resistance.read(runs[1])
+    for changes, expected in (((-9e3, 8e3, -5e3, 6e3, 1e3), "steady over all tows, and 4 of 5 by themselves"),
+                              ((9e3, 8e3, 5e3, 6e3, 7e3), "over all tows the load rises by 7.00 kN in the window; "
+                                                          "4 of 5 steady by themselves"),
+                              ((-9e3, 8e3, -5e3, 6e3), "3 of 4 tows steady")):
+        tows = [replace(point, change=change, steady=k > 0) for k, change in enumerate(changes)]
+        assert plot_resistance.words(tows).splitlines()[1] == f"    Verdict: {expected}."
+
+
+def test_tows_of_other_length_are_no_other_case(runs):
+    """Red: refused, as the extent of a lead that is not there follows from the tow."""
+    points = [plot_resistance.read(run) for run in runs]
+    for p, mode, length in zip(points, ("none", "none", "channel", "channel"), (3605, 1805, 1805, 905)):
+        p.case = p.case | {"lead.mode": mode, "lead.length": f"{length} m"}
+    plot_resistance.check_alike(points[:2])
+    for pair, key in ((points[1:3], "lead.mode is none there"), (points[2:], "lead.length is 1805 m there")):
+        with pytest.raises(RunError, match=key):
+            plot_resistance.check_alike(pair)
 
 
 def test_the_default_place_is_beside_the_first_run(runs, tmp_path):

@@ -3,6 +3,8 @@
 numbers whose answer is known; every value of a case file says where it is from."""
 import argparse
 import json
+import os
+import pickle
 import re
 import sys
 
@@ -16,6 +18,7 @@ sys.path.insert(0, str(FOLDER))
 
 import arching  # noqa: E402
 import barrier  # noqa: E402
+import nrc_outlines  # noqa: E402
 import points  # noqa: E402
 import runs  # noqa: E402
 import ship  # noqa: E402
@@ -217,3 +220,90 @@ def test_the_band_rises_with_friction(done):
     assert 0.05 < low["mean"] < high["mean"] < 0.25 and not low["unconverged"] + high["unconverged"]
     assert low["slow"] < low["sd"], "averaging takes scatter away"
     assert low["least"] < low["mean"] < low["most"] and low["low"] < low["mean"] < low["high"]
+
+
+# --- outlines of a pickle ---------------------------------------------------------------------------------------------
+
+SQUARE = np.array([[1.0, 3.0], [2.0, 3.0], [2.0, 4.0], [1.0, 4.0]])
+
+
+def floe(ring):
+    """As the published file has it: arrays and numbers of numpy."""
+    return {"vertices": ring, "centre": ring.mean(0), "radius": np.float64(0.7), "area": np.float64(1.0)}
+
+
+class Runs:
+    """What pickle.load would call."""
+
+    def __init__(self, call):
+        self.call = call
+
+    def __reduce__(self):
+        return self.call
+
+
+def of_this_day(data):
+    """numpy 2 names its functions otherwise; the published file has the names of numpy 1."""
+    return data.replace(b"\x8c\x16numpy._core.multiarray", b"\x8c\x15numpy.core.multiarray")
+
+
+def test_outlines_of_a_pickle_are_read_without_running_it(tmp_path, monkeypatch):
+    data = of_this_day(pickle.dumps([floe(SQUARE), floe(SQUARE[:3] + 2)], protocol=4))
+    for name in ("load", "loads", "Unpickler"):
+        monkeypatch.delattr(pickle, name)
+    first, second = nrc_outlines.read(data)
+    assert np.array_equal(first["vertices"], SQUARE) and np.array_equal(second["vertices"], SQUARE[:3] + 2)
+    assert first["area"] == 1.0 and isinstance(first["area"], float)
+    (tmp_path / "floes.pkl").write_bytes(data)
+    nrc_outlines.main([str(tmp_path / "floes.pkl"), str(tmp_path / "floes.geojson")])
+    found = json.loads((tmp_path / "floes.geojson").read_text())["features"]
+    ring = np.array(found[0]["geometry"]["coordinates"][0])
+    # x along the strip, y across from the middle of 1 to 4 m, turned and not mirrored
+    assert np.allclose(ring, [[3, 1.5], [3, 0.5], [4, 0.5], [4, 1.5], [3, 1.5]]) and len(found) == 2
+    turned = np.roll(ring[:4], -1, 0)
+    assert np.sum(ring[:4, 0] * turned[:, 1] - turned[:, 0] * ring[:4, 1]) > 0
+
+
+@pytest.mark.parametrize("what", [
+    [Runs((os.system, ("touch ran",)))], [Runs((eval, ("1",)))], [Runs((np.array, ([1.0],)))],
+    [floe(SQUARE.astype(np.float32))], [floe(SQUARE.astype(object))], [{"vertices": np.array(["a", "b", "c"])}],
+    [floe(np.asfortranarray(SQUARE))], [{"area": 1.0}], [floe(SQUARE[:2])], [floe(SQUARE * np.nan)], {"a": 1}, [], 7,
+])
+def test_a_pickle_of_anything_else_is_refused(what, tmp_path, monkeypatch, capsys):
+    """Red: Unpickler.find_class left as it is runs the first."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "floes.pkl").write_bytes(of_this_day(pickle.dumps(what, protocol=4)))
+    with pytest.raises(SystemExit) as ended:
+        nrc_outlines.main(["floes.pkl", "floes.geojson"])
+    said = capsys.readouterr().err
+    assert ended.value.code == 4 and said.startswith("nrc_outlines.py: floes.pkl: ") and ";" in said
+    assert not (tmp_path / "ran").exists() and not (tmp_path / "floes.geojson").exists()
+
+
+def test_a_pickle_cut_or_changed_anywhere_is_refused_or_read():
+    """No other error than Refused, whatever the bytes."""
+    data = of_this_day(pickle.dumps([floe(SQUARE)], protocol=4))
+    rng = np.random.default_rng(8)
+    refused = 0
+    for k in range(len(data)):
+        for spoilt in (data[:k], data[:k] + bytes([rng.integers(256)]) + data[k + 1:]):
+            try:
+                nrc_outlines.outlines(nrc_outlines.read(spoilt))
+            except nrc_outlines.Refused:
+                refused += 1
+    assert refused > len(data)
+
+
+def test_the_runs_in_a_map_are_those_that_check_takes(tmp_path):
+    rng = np.random.default_rng(4)
+    rings = [SQUARE * 0.3 + [x, y] for x in range(1, 6) for y in range(3, 19) if rng.random() < 0.7]
+    (tmp_path / "floes.pkl").write_bytes(of_this_day(pickle.dumps([floe(r) for r in rings], protocol=4)))
+    a = argparse.Namespace(map=tmp_path / "floes.pkl", out=tmp_path / "out", fields=1)
+    a.out.mkdir()
+    todo = ship.jobs_of_map(a)
+    assert len(todo) == 2 * 4 * len(ship.LANES) + 3 and len({name for _, name, _ in todo}) == len(todo)
+    for name, values in [(name, values) for _, name, values in todo if "+0-f0.05" in name or "open" in name][:8] + [
+            (name, values) for _, name, values in todo[-1:]]:
+        sets = [word for key, value in values.items() for word in ("--set", f"{key.replace('__', '.')}={value}")]
+        result = call("check", FOLDER / "ship.yml", *sets)
+        assert result.returncode == DONE, (name, result.stderr)

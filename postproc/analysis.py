@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What converge.py, budget.py and capability.py find: NAME.json in a folder, NAME.png where something can be drawn, a
-text at the terminal, and a chapter of the report.
+"""The analyses converge, budget and capability: their options, and the result of each as NAME.json in a folder,
+NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
 
 The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
 `found` as it comes back from the file, where what is not finite is None.
