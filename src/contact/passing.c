@@ -7,6 +7,7 @@
 #include "geometry/sweep.h"
 #include "partition/domain.h"
 #include "space/phases.h"
+#include "space/shore.h"
 
 bt_row_state bt_passing_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held)
 {
@@ -27,8 +28,15 @@ static bt_moving moving_part(const bt_bodies *b, bt_idx i, int part, const bt_ve
     return (bt_moving){b->mark[first].count, b->outline + 2 * first, v->x, v->y, v->w};
 }
 
+/// Is pair p of the same bodies as contact u, or of another piece of the same shore?
+static bool of_same_outlines(const bt_world *w, const bt_pair *p, const bt_contact *u)
+{
+    return (p->a == u->a || (bt_shore_holds(w, p->a) && bt_shore_holds(w, u->a))) &&
+           (p->b == u->b || (bt_shore_holds(w, p->b) && bt_shore_holds(w, u->b)));
+}
+
 /// Do the bodies of contact u meet if they bear no load on each other, and all others as they do? All of their parts
-/// nearby count: where several touch at one place, one row stands for all (merge.c).
+/// and pieces nearby count: where several touch at one place, one row stands for all (merge.c).
 static bool meet_without(const bt_world *w, const bt_cell *t, const bt_contact *u)
 {
     const bt_bodies *b = &w->bodies;
@@ -36,13 +44,16 @@ static bool meet_without(const bt_world *w, const bt_cell *t, const bt_contact *
     bt_vel va = b->vel[u->a], vb = b->vel[u->b];
     bt_apply(u, -(u->ln[0] + u->ln[1]), -(u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1]),
              -(u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1]), -u->lt, b->inv[u->a], b->inv[u->b], &va, &vb);
-    double d[2];
-    bt_bodies_offset(w, u->a, u->b, d);
-    bt_idx first = u->pair, end = u->pair + 1;
-    while (first > 0 && pairs[first - 1].a == u->a && pairs[first - 1].b == u->b) first--;
-    while (end < t->search.n_pairs && pairs[end].a == u->a && pairs[end].b == u->b) end++;
+    bt_idx first = u->pair, end = u->pair + 1; // the list is in the order of gids
+    if (bt_shore_holds(w, u->a) || bt_shore_holds(w, u->b)) first = 0, end = t->search.n_pairs;
+    while (first > 0 && of_same_outlines(w, &pairs[first - 1], u)) first--;
+    while (end < t->search.n_pairs && of_same_outlines(w, &pairs[end], u)) end++;
     for (bt_idx i = first; i < end; i++) {
-        const bt_moving p = moving_part(b, u->a, pairs[i].part[0], &va), q = moving_part(b, u->b, pairs[i].part[1], &vb);
+        if (!of_same_outlines(w, &pairs[i], u)) continue;
+        double d[2];
+        bt_bodies_offset(w, pairs[i].a, pairs[i].b, d);
+        const bt_moving p = moving_part(b, pairs[i].a, pairs[i].part[0], &va),
+                        q = moving_part(b, pairs[i].b, pairs[i].part[1], &vb);
         if (bt_sweep_meets(&p, &q, d[0], d[1], w->par.slop, w->par.dt)) return true;
     }
     return false;
