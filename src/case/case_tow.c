@@ -335,7 +335,7 @@ static void warn_of_overtaking(const bt_case *c, bt_errors *warnings)
 static void warn_of_short_run(const bt_case *c, bt_errors *warnings)
 {
     if (c->tow.mode == BT_TOW_NONE || c->tow.n_programme > 0 || !(c->tow.speed > 0)) return;
-    if (c->tow.ramp < c->run.duration) return;
+    if (!(c->tow.ramp >= c->run.duration)) return;
     bt_warn(warnings, BT_WARN_SHORT_RUN,
             "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
             "lengthen run.duration, or give a shorter ramp",
