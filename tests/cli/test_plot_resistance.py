@@ -45,7 +45,7 @@ def runs(tmp_path):
     return [
         made_up(tmp_path / "a", 0.1, 2e3),
         made_up(tmp_path / "b", 0.5, 4e4),
-        made_up(tmp_path / "c", 0.5, 6e4, warnings=["a doubt"]),
+        made_up(tmp_path / "c", 0.5, 6e4, warnings=[{"code": "overlap", "text": "a doubt", "values": {}}]),
         made_up(tmp_path / "d", 0.95, 8e5, unconverged_steps=3)
     ]
 

@@ -19,6 +19,7 @@ from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 sys.path.insert(0, str(ROOT / "postproc"))
 
 import ensemble  # noqa: E402
+import loads  # noqa: E402
 import plot_ensemble  # noqa: E402
 import plot_force  # noqa: E402
 import report_ensemble  # noqa: E402
@@ -134,6 +135,8 @@ def test_statistics_and_pictures_of_an_ensemble(both):
     assert np.isfinite([first.adrift(m) for m in range(first.n)]).any() and first.without_mean
     assert {w["text"] for m in range(first.n) for w in first.warnings(m)}.isdisjoint(
         w["text"] for m in range(first.n) for w in second.warnings(m))
+    needs = [{load.name: load.needs for load, _ in loads.of_member(e, 3)[0]} for e in (first, second)]
+    assert needs[0] == needs[1] and needs[0]["line_tension_1"] == "line" and needs[0]["line_tension_2"] == "bridle"
     found = [ensemble.statistics(e, OPTIONS) for e in (first, second)]
     assert "the line parted in" in str(found[0]["conditions"][2]["design"]["warnings"])
     one, two = (json.loads(json.dumps(plain_data(s | {"folder": "", "doubts": {}}))) for s in found)
