@@ -44,7 +44,8 @@ def bound(key):
 def default(key):
     if key["required"]:
         return "required"
-    return plain("= " + key["follows"]) if key["follows"] else f"`{key['default']}`"
+    text = plain("= " + key["follows"]) if key["follows"] else f"`{key['default']}`"
+    return text if key["default_at_sea"] else text + ", in the geographic frame none"
 
 
 def table_of(keys):

@@ -56,7 +56,11 @@ void bt_case_frame_check(const bt_check *k, bool by_hand)
     for (int i = 0; i < bt_n_case_keys; i++) {
         const bt_key *row = &bt_case_keys[i];
         if (!row->at_sea || !bt_check_sound(k, row->name) || !is_missing(k, row)) continue;
-        if (!is_used(c, row->name, by_hand) || may_miss(c, row->name, by_hand)) continue;
+        if (!is_used(c, row->name, by_hand)) { // a number without effect that is given as none
+            bt_schema_preset(row, row->type == BT_KEY_REAL, c);
+            continue;
+        }
+        if (may_miss(c, row->name, by_hand)) continue;
         if (is_basin(c)) bt_check_fault(k, row->name, "is none where a value is needed; give it (%s)", row->at_sea);
         else
             bt_check_fault(k, row->name,

@@ -73,8 +73,8 @@ def test_keys_as_json(table):
     assert [k["name"] for k in table["keys"]] == [n for n in listed if "." in n][:len(table["keys"])]
     keys = {k["name"]: k for k in table["keys"]}
     assert keys["run.dt"] | {"doc": ""} == {
-        "name": "run.dt", "type": "real", "required": True, "default": None, "follows": None, "unit": "s", "least": 0,
-        "above_least": True, "most": 1000, "below_most": False, "doc": ""
+        "name": "run.dt", "type": "real", "required": True, "default": None, "follows": None, "default_at_sea": False,
+        "unit": "s", "least": 0, "above_least": True, "most": 1000, "below_most": False, "doc": ""
     }
     assert (keys["body.yaw"]["least"], keys["body.yaw"]["unit"], keys["body.yaw"]["default"]) == (-360, "deg", "0 deg")
     assert keys["tow.mode"]["choices"] == ["none", "speed", "line", "thrust"

@@ -41,7 +41,7 @@ ALL = {
 def test_everything_at_once(tmp_path):
     case = with_bays(tmp_path, ALL)
     text = json.loads(case.read_text())
-    text["ice"] |= {"crushing": ALL["ice"]["crushing"]}
+    text["ice"] |= {"size": 1, "crushing": ALL["ice"]["crushing"]}
     case.write_text(json.dumps(text))
     one = run(tmp_path, case, "--threads", 1, "--quiet")
     s = one.summary
