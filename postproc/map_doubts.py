@@ -49,8 +49,8 @@ def necks(floes):
     if share <= HUNG:
         return None
     return doubt("necks", f"necks narrower than an eighth of the floe in {len(hung)} of {len(floes)} floes, "
-                 f"{100 * share:.0f} % of the ice: floes that touch became one; part them in the image first", floes=len(hung),
-                 share=share, first=[f.name for f in hung[:map_repair.NAMED]])
+                 f"{100 * share:.0f} % of the ice: floes that touch became one; part them in the image first",
+                 floes=len(hung), share=share, first=[f.name for f in hung[:map_repair.NAMED]])
 
 
 def has_neck(polygon):

@@ -435,10 +435,20 @@ def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles
     assert sum(map(len, kept)) > 2 * sum(map(len, got))
 
 
+def test_the_edge_of_an_image_is_seen_before_staircases_go(tmp_path):
+    labels = discs(np.zeros((90, 90), np.int32), (20, 0, 12, 1), (60, 1, 15, 2), (40, 60, 20, 3))
+    rings = [np.asarray(p.exterior.coords)[:-1] * (1, -1) for p, _ in map_read.regions(labels, labels > 0)]
+    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    counts = counted(outlines(map_)[1])
+    assert counts["stairs"] == 3 and counts["cut kept"] == 2
+
+
 def test_outlines_drawn_by_hand_are_no_staircases(tmp_path):
-    """Boxes on a grid, polygons of any kind: as they are."""
+    """Boxes on a grid, crosses of long edges, polygons of any kind: as they are."""
+    cross = np.array([[3, 0], [6, 0], [6, 3], [9, 3], [9, 6], [6, 6], [6, 9], [3, 9], [3, 6], [0, 6], [0, 3], [3, 3]])
+    crosses = [10 * cross + (200 * k, 30 * k) for k in range(3)] + [np.array([[0, 0], [10, 0], [10, 10], [0, 10]]) - 50]
     boxes = [np.array([[0, 0], [20, 0], [20, 30], [10, 30], [10, 20], [0, 20]]) + (50 * k, 10 * k) for k in range(6)]
-    for rings in (boxes, RINGS):
+    for rings in (boxes, crosses, RINGS):
         got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.LOCAL), "--centre", "0,0")
         assert "stairs" not in counted(record)
         assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-9)
