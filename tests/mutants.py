@@ -319,6 +319,13 @@ MUTANTS = {
          "contacts that push are not listed"),
         ("|| on[l] || moved[i + l];", "|| on[l];", "what has just come to 0 is not listed"),
     ]),
+    "src/space/shore.c": (["physics/test_shore"], [
+        ("else if (near) memset(f->u, 0, sizeof f->u), memset(f->w, 0, sizeof f->w);", "",
+         "a corner inside another piece counts"),
+        ("if (s[0] <= f->from + slack && s[1] > f->from) f->from = s[1], changed = true;", "",
+         "the covered beginning of an edge counts"),
+        ("if (bt_nearest_image(dx, c->period[0]) != dx + c->shift[0]) return;", "", "a polygon is found at two images"),
+    ]),
     "src/contact/detect.c": (["unit/test_contacts", "physics/test_crush", "physics/test_parts", "unit/test_cells",
                               COPIES, "scenes:speed_dense,periodic_dense,window"], [
         ("if (paths + t->margin < p->reach) {", "if (paths < p->reach) {", "the margin is not kept"),
