@@ -320,6 +320,11 @@ MUTANTS = {
          "contacts that push are not listed"),
         ("|| on[l] || moved[i + l];", "|| on[l];", "what has just come to 0 is not listed"),
     ]),
+    "src/space/shore.c": (["physics/test_shore"], [
+        ("else if (near) memset(f->u, 0, sizeof f->u), memset(f->w, 0, sizeof f->w);", "",
+         "a corner inside another piece counts"),
+        ("low[0] - c.shift[0], low[1] - c.shift[1]", "low[0], low[1]", "a polygon is not found across a period"),
+    ]),
     "src/contact/detect.c": (["unit/test_contacts", "physics/test_crush", "physics/test_parts", "unit/test_cells",
                               COPIES, "scenes:speed_dense,periodic_dense,window"], [
         ("if (paths + t->margin < p->reach) {", "if (paths < p->reach) {", "the margin is not kept"),

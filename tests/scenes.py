@@ -58,7 +58,8 @@ SQUARES = [{"shape": "square", "length": 0.8, "x": 6 + 0.95 * (k % 6), "y": -2 +
 #: three flush pieces fill a period, one of them not convex, and a pier stands in the last
 COAST = [{"shape": "polygon", "x": 6, "y": -4, "fixed": True,
           "vertices": [[-6, -0.9], [6, -0.9], [6, 0.4], [1, 1.1], [0, 0.5], [-1, 1], [-6, 0.4]]},
-         {"shape": "polygon", "x": 15, "y": -4.2, "fixed": True, "vertices": [[-3, -0.9], [3, -0.9], [3, 0.9], [-3, 0.6]]},
+         {"shape": "polygon", "x": 15, "y": -4.2, "fixed": True,
+          "vertices": [[-3, -0.9], [3, -0.9], [3, 0.9], [-3, 0.6]]},
          {"shape": "rectangle", "length": 6, "width": 1.5, "x": 21, "y": -4.25, "fixed": True},
          {"shape": "square", "length": 1, "x": 21, "y": -3.2, "yaw": 20, "fixed": True}]
 SHAPES = [{"shape": "disc", "length": 1.1, "x": 5.5, "y": 0.1, "yaw": 50, "vx": -0.37, "vy": -0.11, "yaw_rate": 7},

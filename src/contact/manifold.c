@@ -399,6 +399,55 @@ static int support(const polygon *q, double nx, double ny)
     return at;
 }
 
+/// Is edge i of a shore, and covered by others at an end?
+static bool covered_at_an_end(const part_of_body *q, int i)
+{
+    const bt_face *f = q->face ? &q->face[i] : NULL;
+    return f && (f->from > 0 || f->to * q->p.per_length[i] < 1 - 1e-9);
+}
+
+/// Is x beside a stretch of edge i that shows?
+static bool shows_at(const part_of_body *q, int i, const double x[2])
+{
+    const bt_face *f = &q->face[i];
+    double nx, ny, v[2];
+    edge_normal(&q->p, i, &nx, &ny);
+    world_vertex(&q->p, i, v);
+    const double t = nx * (x[1] - v[1]) - ny * (x[0] - v[0]), slack = 1e-3 / q->p.per_length[i];
+    return f->from < f->to && t >= f->from - slack && t <= f->to + slack;
+}
+
+/// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count, and
+/// where others cover an end of it, what shows.
+static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
+                             bounds most, bt_manifold *m)
+{
+    clip_points(&ref->p, i, ref->face ? &ref->face[i] : NULL, &inc->p, flip, d[0], d[1], most, m);
+    double nx, ny;
+    edge_normal(&ref->p, i, &nx, &ny);
+    const int facing = facing_edge(&inc->p, nx, ny);
+    const bool partly = covered_at_an_end(inc, facing);
+    if (edge_counts(inc, facing) && !partly) return;
+    int kept = 0;
+    for (int k = 0; k < m->n_points; k++) {
+        const uint32_t id = m->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
+        if ((!(id & 1) && corner_counts(inc, (int)(id >> 1), -nx, -ny)) || (partly && shows_at(inc, facing, m->p[k].ra)))
+            m->p[kept++] = m->p[k];
+    }
+    m->n_points = kept;
+}
+
+/// Do others cover an end of edge i of p, or of the edge of q that faces it, and is nothing else between them?
+static bool beside_what_shows(const part_of_body *p, int i, const part_of_body *q)
+{
+    double nx, ny;
+    edge_normal(&p->p, i, &nx, &ny);
+    if (!covered_at_an_end(p, i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, nx, ny)))) return false;
+    bt_manifold m = {0};
+    clip_what_counts(p, i, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &m);
+    return m.n_points == 0;
+}
+
 /// Largest separation of q from p over the edges of p that count, against corners of q that do.
 static double separation_that_counts(const part_of_body *p, const part_of_body *q, int *edge)
 {
@@ -409,27 +458,11 @@ static double separation_that_counts(const part_of_body *p, const part_of_body *
         if (s <= best) continue;
         double nx, ny;
         edge_normal(&p->p, i, &nx, &ny);
-        if (!corner_counts(q, support(&q->p, nx, ny), -nx, -ny)) continue;
+        if (!corner_counts(q, support(&q->p, nx, ny), -nx, -ny) || beside_what_shows(p, i, q)) continue;
         best = s;
         *edge = i;
     }
     return best;
-}
-
-/// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count.
-static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
-                             bounds most, bt_manifold *m)
-{
-    clip_points(&ref->p, i, ref->face ? &ref->face[i] : NULL, &inc->p, flip, d[0], d[1], most, m);
-    double nx, ny;
-    edge_normal(&ref->p, i, &nx, &ny);
-    if (edge_counts(inc, facing_edge(&inc->p, nx, ny))) return;
-    int kept = 0;
-    for (int k = 0; k < m->n_points; k++) {
-        const uint32_t id = m->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
-        if (!(id & 1) && corner_counts(inc, (int)(id >> 1), -nx, -ny)) m->p[kept++] = m->p[k];
-    }
-    m->n_points = kept;
 }
 
 /// The nearest features of two parts that are apart, where both count.
@@ -446,7 +479,8 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
     double nx, ny;
     edge_normal(&ref->p, e, &nx, &ny);
-    if (!edge_counts(ref, e) || !corner_counts(inc, of_b ? ca : cb, -nx, -ny)) return false;
+    if (!edge_counts(ref, e) || !corner_counts(inc, of_b ? ca : cb, -nx, -ny) || beside_what_shows(ref, e, inc))
+        return false;
     clip_what_counts(ref, e, inc, of_b, d, most, m);
     if (m->n_points == 0) deepest_point(&ref->p, e, &inc->p, of_b, d[0], d[1], m);
     return bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= most.margin;

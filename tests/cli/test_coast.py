@@ -105,6 +105,18 @@ def test_pieces_may_lie_in_each_other(tmp_path):
     assert np.allclose(towed(tmp_path / "laid", "bay", over, 0.3), whole, rtol=0.02, atol=1)
 
 
+def test_the_backs_of_pieces_need_not_be_even(tmp_path):
+    """The side of a piece that is deeper than its neighbour is covered at the front and shows at the back. The body
+    lies a little in the pieces, within the slop."""
+    line = SHORES["straight"][0]
+    whole = towed(tmp_path / "whole", "straight", [floe(p) for p in pieces(line, 1)], body__shape="disc")
+    uneven = []
+    for k, ring in enumerate(pieces(line, 64)):
+        ring[:2, 1] -= 7 * (k % 2)
+        uneven.append(floe(ring))
+    assert np.allclose(towed(tmp_path / "uneven", "straight", uneven, body__shape="disc"), whole, rtol=0.02, atol=1)
+
+
 PERIOD = {
     "run": {"dt": 0.5, "duration": 600},
     "domain": {"length": 100, "width": 100, "ends": "periodic", "sides": "periodic"},

@@ -114,8 +114,8 @@ static void pieces_touch_as_their_outline_does(void **state)
                     const double x = p->x + arm[0], y = p->y + arm[1];
                     // no part of the outline is beyond the plane through the point, but for the gap that it halves
                     if (support(n, outline, nx, ny) - (nx * x + ny * y) > margin + 1e-9)
-                        fail_msg("scene %d, place %d: a contact at (%g, %g) along (%g, %g) is inside the outline", scene,
-                                 place, x, y, nx, ny);
+                        fail_msg("scene %d, place %d: a contact at (%g, %g) along (%g, %g) is inside the outline",
+                                 scene, place, x, y, nx, ny);
                     least = bt_min(least, m->p[j].gap);
                 }
             free(man);
@@ -133,6 +133,41 @@ static void pieces_touch_as_their_outline_does(void **state)
         bt_world_free(w);
     }
     assert_true(seen > 4000 && deep > 1000);
+}
+
+/// Blocks of different depth with their fronts in one line: above it a floe is pushed straight away from it, although
+/// the sides of the deeper ones show at their backs.
+static void sides_that_show_at_the_back_do_not_stop_a_slide(void **state)
+{
+    (void)state;
+    uint64_t rng = 3;
+    const double margin = 0.5;
+    int seen = 0;
+    bt_world *w = world_of(0);
+    for (int k = 0; k < 20; k++) {
+        const double depth = 2 + 2 * scene_uniform(&rng), x = k - 10;
+        add_fixed(w, 4, (double[8]){x, -depth, x + 1, -depth, x + 1, 0, x, 0});
+    }
+    double v[8];
+    scene_square(1.5, v);
+    bt_body_def d = scene_prism(4, v, 900);
+    const bt_gid probe = bt_world_add(w, &d);
+    bt_shore_create(w);
+    for (int place = 0; place < 4000; place++) {
+        const bt_idx i = bt_world_index(w, probe);
+        bt_pose *p = &w->bodies.pose[i];
+        *p = (bt_pose){14 * (scene_uniform(&rng) - 0.5), 0, 0.02 * (scene_uniform(&rng) - 0.5)};
+        bt_bodies_turn(&w->bodies, i);
+        p->y = support(4, w->bodies.outline + 2 * w->bodies.offset[i], 0, -1) + 0.004 * (scene_uniform(&rng) - 0.8);
+        bt_manifold *man;
+        bt_idx n_man;
+        brute_force(w, margin, &man, &n_man);
+        for (bt_idx c = 0; c < n_man; c++, seen++)
+            if (fabs(man[c].nx) > 0.02) fail_msg("place %d: pushed along (%g, %g)", place, man[c].nx, man[c].ny);
+        free(man);
+    }
+    assert_true(seen > 4000);
+    bt_world_free(w);
 }
 
 /// The tree finds the polygons of a shore as a look at all pairs does, also across periods.
@@ -184,6 +219,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pieces_touch_as_their_outline_does),
+        cmocka_unit_test(sides_that_show_at_the_back_do_not_stop_a_slide),
         cmocka_unit_test(detection_on_a_shore_equals_brute_force),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -180,7 +180,7 @@ static void floes_by_hand_are_checked(void **state)
         {"{x: 9, y: 0, shape: polygon}", "has shape polygon and no vertices"},
         {"{x: 9, y: 0, shape: none}", "did you mean"},
         {"{x: 9, y: 0, length: 1, vertices: [[0,0],[1,0],[0,1]]}", "the shape is not polygon"},
-        {"{x: 9, y: 0, shape: polygon, vertices: [[0,0],[2,0],[1,0.1],[0,2]]}", "outline is refused"},
+        {"{x: 9, y: 0, shape: polygon, vertices: [[0,0],[2,0],[0,2],[2,2]]}", "outline is refused"},
         {"{x: 9, y: 0, length: 1, x: 2}", "duplicate key"},
         {"{x: 9, y: 0, length: 0}", "out of range"},
         {"{x: 9, y: 0, shape: polygon, vertices: [[0,0],[1,0]]}", "has 2 points"},
