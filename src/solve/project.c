@@ -33,8 +33,7 @@ enum { TURNS, N_FOUND };
 enum { LEFT = 5 }; // slops that a turn may leave as overlap: half of what a run warns of, assumed
 
 /// May the turn of contact j in this step, whose gaps are those at its end, have left more than `least` of overlap, m?
-/// Only of pairs that touch with their outlines as they are: what has given way is no overlap. Sheets are of a pair that
-/// has.
+/// Only of pairs that touch with their outlines as they are: what has given way, as that of sheets, is no overlap.
 static bool turns(const bt_world *w, const bt_cell *cell, bt_idx j, double least)
 {
     const bt_bodies *b = &w->bodies;

@@ -83,7 +83,8 @@ def test_a_key_of_several_values_of_one_parameter(tmp_path):
     said = call("check", "study.yml", cwd=tmp_path)
     assert said.returncode == CASE
     for line in 4, 5:
-        assert f"study.yml:{line}: ice.size: is given under `with`, and under `parameters` in study.yml:2" in said.stderr
+        said_of = f"study.yml:{line}: ice.size: is given under `with`, and under `parameters` in study.yml:2"
+        assert said_of in said.stderr
 
 
 def test_study_without_base(tmp_path):
