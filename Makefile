@@ -258,7 +258,6 @@ demo: deps-demo ## resistance of an iceberg in 20, 50 and 80 % ice: the answer, 
 	@echo "now the program is built, and the iceberg towed through 15 ice fields: 100 s on two cores"
 	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow ensemble cases/studies/demo.yml -o $(DEMO)
-	$(PYTHON) postproc/plot_field.py $(FIELD) -o $(DEMO)/field.png
 	$(PYTHON) postproc/report.py $(FIELD) -o $(DEMO)/replay.html
 	$(PYTHON) postproc/plot_resistance.py $(DEMO)/members/* -o $(DEMO)/resistance.png --words
 	@echo "picture of it: $(DEMO)/resistance.png; one field of 80 % with a replay: $(DEMO)/replay.html"

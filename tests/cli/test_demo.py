@@ -53,12 +53,12 @@ def test_the_demo_answers_with_what_it_has_installed(tmp_path):
     done = call("ensemble", tmp_path / "study.yml", "-o", out)
     assert done.returncode == DONE, done.stderr
     scripts = [line.replace("out/demo", str(out)) for line in demo().splitlines() if " postproc/" in line]
-    assert len(scripts) == 3
+    assert len(scripts) == 2
     for line in scripts:
         done = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True,
                               env=os.environ | {"PYTHONPATH": str(tmp_path / "hidden")})
         assert done.returncode == 0, (line, done.stderr)
-    assert all((out / name).exists() for name in ("field.png", "replay.html", "resistance.png"))
+    assert all((out / name).exists() for name in ("replay.html", "resistance.png"))
     answer = re.findall(r"^(\d+) % ice adds \S+ kN \(95 %: \S+ to \S+\), the mean of 2 tows", done.stdout, re.M)
     assert answer == ["20", "50", "80"] and "Without ice: open-water drag" in done.stdout
 
