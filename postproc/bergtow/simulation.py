@@ -328,8 +328,8 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
     """Run a case to its end and return its Result. out: the result folder. Ctrl-C ends it between steps as it ends
     `bergtow run`: with a summary and a checkpoint, from which Simulation.resume goes on.
 
-    progress: True for the line of `bergtow run`, which the run renews a few times a second, in notebooks too; or a function, called as
-    often with the Simulation.
+    progress: True for the line of `bergtow run`, which the run renews a few times a second, in notebooks too; or a
+    function, called as often with the Simulation.
     """
     show, last = _line if progress is True else progress, 0.0
     with Simulation(case, out, forces=forces, threads=threads, replace=replace) as sim:

@@ -98,7 +98,7 @@ int bt_cmd_run(int argc, char **argv)
     bt_status status = bt_cmd_each_may_read(comm, o.file.path, &err);
     if (status == BT_OK) status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     if (status == BT_OK) status = check_dump(&o.run, &c, &err);
-    if (status == BT_OK && comm->rank == 0) 
+    if (status == BT_OK && comm->rank == 0)
         status = bt_folder_may_take(o.run.dir, o.force, "give another folder with -o, or --force to replace it", &err);
     if (status == BT_OK && comm->rank == 0 && o.run.dump_path)
         status = bt_cmd_may_write(o.run.dump_path, o.file.path, false, o.force, &err);

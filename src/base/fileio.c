@@ -120,8 +120,8 @@ bt_status bt_file_may_take(const char *path, bt_errors *err)
     const char *kind = stat(path, &st) == 0 && !S_ISDIR(st.st_mode) ? kind_of(st.st_mode) : NULL;
     if (!kind && (is_own_descriptor(path) || !strncmp(path, "/dev/std", 8))) kind = "an open descriptor";
     if (!kind) return BT_OK; // a folder in the way is reported by the system
-    bt_errors_add(err, "%s: is %s and no regular file, which nothing replaces; move it away, or give another name", path,
-                  kind);
+    bt_errors_add(err, "%s: is %s and no regular file, which nothing replaces; move it away, or give another name",
+                  path, kind);
     return BT_ERR_IO;
 }
 

@@ -27,9 +27,9 @@ bt_status bt_file_read(const char *path, const char *what, char **text, size_t *
 /// The same of at most so many bytes, from a regular file alone.
 bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err);
 
-/// May a file of ours take this name? A device, a pipe or a socket, or a link to one, is never replaced nor removed, nor
-/// is what this process was given open (/dev/stdout). All that follows here, and bt_h5_create, asks this first. Errors:
-/// BT_ERR_IO.
+/// May a file of ours take this name? A device, a pipe or a socket, or a link to one, is never replaced nor removed,
+/// nor is what this process was given open (/dev/stdout). All that follows here, and bt_h5_create, asks this first.
+/// Errors: BT_ERR_IO.
 bt_status bt_file_may_take(const char *path, bt_errors *err);
 
 /// Write text to path by way of a temporary name and bt_file_rename: path holds the old or the new text, never a part.

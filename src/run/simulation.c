@@ -161,7 +161,8 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
     bt_simulation *s = simulation_of(o);
     bt_status status = check_numbers(o, &err);
     if (status == BT_OK) status = read_case(&s->c, o, &err);
-    if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, "give another folder, or replace=True to replace it", &err);
+    if (status == BT_OK && s->dir && comm->rank == 0)
+        status = bt_folder_may_take(s->dir, o->replace, "give another folder, or replace=True to replace it", &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = begin(s, &err);
     return hand_out(out, s, status, &err);
