@@ -431,8 +431,8 @@ static void clip_what_counts(const part_of_body *ref, int i, const part_of_body 
     int kept = 0;
     for (int k = 0; k < m->n_points; k++) {
         const uint32_t id = m->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
-        if ((!(id & 1) && corner_counts(inc, (int)(id >> 1), -nx, -ny)) || (partly && shows_at(inc, facing, m->p[k].ra)))
-            m->p[kept++] = m->p[k];
+        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -nx, -ny);
+        if (corner || (partly && shows_at(inc, facing, m->p[k].ra))) m->p[kept++] = m->p[k];
     }
     m->n_points = kept;
 }

@@ -83,7 +83,8 @@ static void box_about(int n, const double *v, double clearance, double box[8])
 
 // Add a convex body, or a part of one, and its periodic images that reach into the region; the ice loses what they
 // cover. False for a body so slender that room for the clearance cannot be made by scaling: it would keep floes away
-// all along its line, and its images would be without number. A part so slender is a sliver along an edge, and gets a box.
+// all along its line, and its images would be without number. A part so slender is a sliver along an edge, and gets a
+// box.
 static bool add_obstacle(bt_region *y, int n, const double *v, bool part)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;

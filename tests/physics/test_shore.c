@@ -157,6 +157,10 @@ static void sides_that_show_at_the_back_do_not_stop_a_slide(void **state)
         const bt_idx i = bt_world_index(w, probe);
         bt_pose *p = &w->bodies.pose[i];
         *p = (bt_pose){14 * (scene_uniform(&rng) - 0.5), 0, 0.02 * (scene_uniform(&rng) - 0.5)};
+        if (place % 2) { // with a corner just past a seam
+            p->x = floor(p->x) + 0.25 + 0.006 * (scene_uniform(&rng) - 0.5);
+            p->yaw *= 0.1;
+        }
         bt_bodies_turn(&w->bodies, i);
         p->y = support(4, w->bodies.outline + 2 * w->bodies.offset[i], 0, -1) + 0.004 * (scene_uniform(&rng) - 0.8);
         bt_manifold *man;
