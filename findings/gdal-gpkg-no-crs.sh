@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # A layer in metres that has no coordinate system comes back from a GeoPackage of GDAL with one in degrees.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch python3-gdal=3.6.2+dfsg-1+b2 libgdal32=3.6.2+dfsg-1+b2
 

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # h5diff ends with 0 for datasets of different lengths, as for equal ones; with -q it says nothing either.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch hdf5-tools=1.10.8+repack1-1 python3-h5py=3.7.0-8
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # A valid netCDF-4 file behind a user block of 512 bytes, where HDF5 looks for its signature too: the netCDF library
 # opens it; xarray finds no engine for it until one is named; CDO calls it unsupported.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch netcdf-bin=1:4.9.0-3+b1 cdo=2.1.1-1+deb12u1 python3-xarray=2023.01.0-1.1 python3-netcdf4=1.6.2-1+b1 \
   python3-h5netcdf=1.1.0-1 python3-h5py=3.7.0-8

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # METIS_PartGraphKway leaves parts empty where vertices are few, and returns METIS_OK; METIS_PartGraphRecursive, given
 # the same, fills all. Three vertices a part are few.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch libmetis5=5.1.0.dfsg-7 libmetis-dev=5.1.0.dfsg-7
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # METIS as Debian builds it has 32-bit integers: where the vertex weights, each of which fits, sum to more than 2^31, it
 # prints that it cannot bisect a graph without vertices, and returns METIS_OK with every vertex in one part.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch libmetis5=5.1.0.dfsg-7 libmetis-dev=5.1.0.dfsg-7
 

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # UDUNITS reads nmi, the usual symbol of the nautical mile, as a nano-mile, and kn, that of the knot, not at all.
+# shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch udunits-bin=2.2.28-5 libudunits2-0=2.2.28-5 libudunits2-data=2.2.28-5
 export UDUNITS2_XML_PATH="$root/usr/share/xml/udunits/udunits2.xml"

@@ -178,8 +178,8 @@ def table(points):
 
 
 def words(points):
-    """The rows as sentences: what the ice of each concentration adds, and the estimates meant for it; at last what open
-    water takes."""
+    """The rows as sentences: what the ice of each concentration adds, and the estimates meant for it; at last what
+    open water takes."""
     def of(estimates, row):
         return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
                          if row["valid"].get(name) and np.isfinite(row["forces"][name]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `make demo` says beforehand and answers, and that tests/roots.sh fails a demo that takes too much of the disk."""
+"""What `make demo` says beforehand and answers; that tests/roots.sh fails a demo that takes too much of the disk."""
 import os
 import re
 import subprocess
