@@ -125,7 +125,7 @@ def once(points):
 
 
 def rows(points):
-    """One row a concentration: (asked, number of runs, how many are steady, mean, drift of all (stat_drift.of), standard
+    """One row a concentration: (asked, number of runs, how many steady, mean, drift of all (stat_drift.of), standard
     error, 95 % interval, ratio and force of each estimate, worst share of steps missed).
 
     Of several runs: mean of the means, error and interval from their scatter. Of one: its own.
