@@ -48,7 +48,9 @@ done
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
 # shellcheck disable=SC2046 # one word a file
-if have shellcheck; then shellcheck -x --source-path=SCRIPTDIR $(files '*.sh' .ci/run) || complain "shellcheck: see above"; fi
+if have shellcheck; then
+    shellcheck -x --source-path=SCRIPTDIR $(files '*.sh' .ci/run) || complain "shellcheck: see above"
+fi
 # shellcheck disable=SC2046
 if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
 # The package alone: what it imports is taken as it comes, and the scripts beside it are not annotated throughout.

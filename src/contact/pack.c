@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "contact/law.h"
-#include "contact/passing.h"
 #include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
@@ -152,6 +151,13 @@ static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, c
     if (w->par.warm_start) inherit(m, h, u);
 }
 
+/// Velocity at which point i of these gaps comes to touch at the end of the step, m/s; beyond all speeds where the row
+/// is released.
+static double place_of(const bt_world *w, const bt_gaps *g, int i)
+{
+    return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
+}
+
 /// Normal bias b of model equation (1). Of a pair that passes: contact/passing.h.
 static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, double restitution)
 {
@@ -167,18 +173,37 @@ static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, 
         if (approach < -w->par.rest_speed && g->gap[i] + w->par.dt * bt_min(closing, 0) < w->par.slop)
             return restitution * bt_max(approach, bt_min(closing, 0));
     }
-    return bt_pack_place(w, g, i);
-}
-
-double bt_pack_place(const bt_world *w, const bt_gaps *g, int i)
-{
-    return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
+    return place_of(w, g, i);
 }
 
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share)
 {
     const double restitution = share * w->bodies.restitution[u->b];
     for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g, i, restitution);
+}
+
+void bt_pack_set_row(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state)
+{
+    bt_contact *u = &t->contacts[j];
+    bt_gaps *g = &t->gaps[j];
+    g->row = state;
+    if (state == BT_ROW_RELEASED) u->ln[0] = u->ln[1] = u->lt = 0;
+    bt_pack_bias(w, u, g, 1);
+    if (t->laws.limits)
+        for (int i = 0; i < u->n; i++) t->laws.limits[j].place[i] = place_of(w, g, i);
+}
+
+/// State of the row of contact j, made from manifold m; held: what it takes over.
+static bt_row_state row_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held)
+{
+    if (w->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
+    if (w->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
+    if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
+    for (int i = 0; i < m->n_points; i++)
+        if (m->p[i].gap <= w->par.slop || t->gaps[j].gap[i] <= w->par.slop) return BT_ROW_STAYS;
+    for (int law = 0; t->laws.limits && law < BT_ALL_LAWS; law++)
+        if (t->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
+    return BT_ROW_OPEN;
 }
 
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
@@ -210,7 +235,7 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
         }
         fill_contact(w, &s->man[i], s->pair[i], &s->held[i], u, &t->gaps[at]);
         if (bounded) bt_laws_bound(w, t, at, p, &s->man[i]); // the gaps may be others after it
-        bt_passing_set(w, t, at, bt_passing_state(w, t, at, &s->man[i], &s->held[i]));
+        bt_pack_set_row(w, t, at, row_state(w, t, at, &s->man[i], &s->held[i]));
         p->contact = at;
     }
 }

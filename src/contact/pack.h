@@ -6,6 +6,13 @@
 #include "contact/contacts.h"
 #include "space/cells.h"
 
+/// What the way of a pair has to say about its row (contact/passing.h).
+typedef enum {
+    BT_ROW_STAYS,    ///< in touch, or loaded in the step before, or released and back
+    BT_ROW_OPEN,     ///< apart by more than the slop, without load in the step before: it can be released
+    BT_ROW_RELEASED, ///< the two pass each other
+} bt_row_state;
+
 /// What a contact hands on to the one that takes its place.
 typedef struct bt_held {
     int32_t n;           ///< points, 0 = there was none
@@ -40,8 +47,7 @@ void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u);
 /// Normal biases of a contact with these gaps, `share`: factor on the restitution.
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
 
-/// Velocity at which point i of these gaps comes to touch at the end of the step, m/s; beyond all speeds where the row
-/// is released (contact/passing.h).
-double bt_pack_place(const bt_world *w, const bt_gaps *g, int i);
+/// The row of contact j of cell t gets this state, and the bias that goes with it.
+void bt_pack_set_row(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state);
 
 #endif

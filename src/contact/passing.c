@@ -2,24 +2,12 @@
 // Rows of pairs that pass each other are released, and come back where the pair meets; passing.h.
 #include "contact/passing.h"
 
-#include "contact/law.h"
+#include "contact/pack.h"
 #include "contact/row.h"
 #include "geometry/sweep.h"
 #include "partition/domain.h"
 #include "space/phases.h"
 #include "space/shore.h"
-
-bt_row_state bt_passing_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held)
-{
-    if (w->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
-    if (w->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
-    if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
-    for (int i = 0; i < m->n_points; i++)
-        if (m->p[i].gap <= w->par.slop || t->gaps[j].gap[i] <= w->par.slop) return BT_ROW_STAYS;
-    for (int law = 0; t->laws.limits && law < BT_ALL_LAWS; law++)
-        if (t->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
-    return BT_ROW_OPEN;
-}
 
 /// Part `part` of body i, as bt_contacts_parts sees it.
 static bt_moving moving_part(const bt_bodies *b, bt_idx i, int part, const bt_vel *v)
@@ -59,17 +47,6 @@ static bool meet_without(const bt_world *w, const bt_cell *t, const bt_contact *
     return false;
 }
 
-void bt_passing_set(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state)
-{
-    bt_contact *u = &t->contacts[j];
-    bt_gaps *g = &t->gaps[j];
-    g->row = state;
-    if (state == BT_ROW_RELEASED) u->ln[0] = u->ln[1] = u->lt = 0;
-    bt_pack_bias(w, u, g, 1);
-    if (t->laws.limits)
-        for (int i = 0; i < u->n; i++) t->laws.limits[j].place[i] = bt_pack_place(w, g, i);
-}
-
 static void review_cell(bt_world *w, bt_idx k, const void *context, bt_totals *totals)
 {
     const bool release = *(const bool *)context;
@@ -80,8 +57,8 @@ static void review_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t
         const bool released = t->gaps[j].row == BT_ROW_RELEASED;
         if (t->gaps[j].row == BT_ROW_STAYS || (!released && u->ln[0] == 0 && u->ln[1] == 0)) continue;
         if (meet_without(w, t, u) != released) continue;
-        if (released) bt_passing_set(w, t, j, BT_ROW_STAYS);
-        else if (release) bt_passing_set(w, t, j, BT_ROW_RELEASED);
+        if (released) bt_pack_set_row(w, t, j, BT_ROW_STAYS);
+        else if (release) bt_pack_set_row(w, t, j, BT_ROW_RELEASED);
         changed++;
     }
     if (changed > 0) bt_sum_add(&totals->sum[0], changed);

@@ -19,21 +19,7 @@
 #ifndef BERGTOW_PASSING_H
 #define BERGTOW_PASSING_H
 
-#include "contact/contacts.h"
-#include "contact/pack.h"
-
-/// What the way of a pair has to say about its row.
-typedef enum {
-    BT_ROW_STAYS,    ///< in touch, or loaded in the step before, or released and back
-    BT_ROW_OPEN,     ///< apart by more than the slop, without load in the step before: it can be released
-    BT_ROW_RELEASED, ///< the two pass each other
-} bt_row_state;
-
-/// State of the row of contact j of cell t as it is made from manifold m; held: what it takes over.
-bt_row_state bt_passing_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held);
-
-/// The row of contact j of cell t gets this state, and the bias that goes with it.
-void bt_passing_set(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state);
+#include "bergtow/world.h"
 
 /// Collective. After a solve that converged: release rows (if so), and give released pairs that meet their rows again.
 /// Returns how many rows have changed, or with `release` false would have: then the step has to be solved again.

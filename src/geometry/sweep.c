@@ -8,7 +8,7 @@
 // The earliest τ at which one pair of vertices can be as near as `near` is safe; there the nearest points are looked
 // for anew. On a straight way this is Newton's iteration for the passage, and ends after two to five rounds.
 //
-// Rejected: the distance at the end of the step alone (tunnels), samples along the way (a number to choose, and slower).
+// Rejected: the distance at the end of the step alone (tunnels); samples along the way (a number to choose, slower).
 #include "geometry/sweep.h"
 
 #include <math.h>
@@ -47,8 +47,8 @@ static void nearest(int n, const double *p, int m, const double *q, double sign,
 }
 
 /// The earliest time at which a vertex of b can be within `near` of one of a along n.
-static double safe_time(const bt_moving *a, const double *p, const bt_moving *b, const double *q, const double centre[2],
-                        const double n[2], double near)
+static double safe_time(const bt_moving *a, const double *p, const bt_moving *b, const double *q,
+                        const double centre[2], const double n[2], double near)
 {
     const double vx = b->x - a->x, vy = b->y - a->y;
     double first = INFINITY;

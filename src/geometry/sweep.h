@@ -5,8 +5,8 @@
 
 #include <stdbool.h>
 
-/// A convex polygon that moves: n vertices v [n][2] relative to the point it turns about, m; velocity x, y, m/s; turning
-/// rate, rad/s.
+/// A convex polygon that moves: n vertices v [n][2] relative to the point it turns about, m; velocity x, y, m/s; rate
+/// of turn, rad/s.
 typedef struct bt_moving {
     int n;
     const double *v;

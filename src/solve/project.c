@@ -20,7 +20,6 @@
 
 #include "contact/law.h"
 #include "contact/pack.h"
-#include "contact/passing.h"
 #include "contact/row.h"
 #include "solve/solver.h"
 #include "partition/domain.h"

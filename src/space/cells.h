@@ -79,7 +79,7 @@ _Static_assert(sizeof(bt_contact) == 128, "two cache lines; four lines of four n
 typedef struct bt_gaps {
     double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
     uint32_t feature[2];   ///< of the points
-    int32_t row;           ///< bt_row_state (contact/passing.h)
+    int32_t row;           ///< bt_row_state (contact/pack.h)
 } bt_gaps;
 
 /// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).

@@ -205,34 +205,14 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
     *t0 = now;
 }
 
-/// Solve, and again while pairs that bear load are found to pass each other, or pairs that were let pass to meet
-/// (contact/passing.h). The last rounds only give rows back.
-static void solve_passing(bt_world *w)
-{
-    enum { MAX_ROUNDS = 8, MAX_RELEASES = 3 };
-    bt_step_stats *st = &w->stats;
-    int64_t sweeps = 0, updates = 0, moves = 0, checks = 0;
-    for (int round = 0;; round++) {
-        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
-        sweeps += st->sweeps;
-        updates += st->unit_updates;
-        moves += st->unit_moves;
-        checks += st->residual_checks;
-        st->misjudged = st->converged ? bt_passing_review(w, round < MAX_RELEASES) : 0;
-        if (st->misjudged == 0 || round == MAX_ROUNDS) break;
-    }
-    st->sweeps = sweeps;
-    st->unit_updates = updates;
-    st->unit_moves = moves;
-    st->residual_checks = checks;
-}
-
-/// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
+/// Detect and solve. The step is solved again, from the impulses found so far, for two reasons. Pairs that bear load
+/// are found to pass each other, or pairs that were let pass to meet (contact/passing.h): the last rounds only give
+/// rows back. And the margin of the detection holds for the velocities before the solve; contacts can make a floe
 /// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
-/// margin has grown are detected again and the step is solved again, from the impulses found so far.
+/// margin has grown are detected again.
 static void solve_contacts(bt_world *w)
 {
-    enum { MAX_REPEATS = 4 };
+    enum { MAX_REPEATS = 4, MAX_ROUNDS = 8, MAX_RELEASES = 3 };
     bt_step_stats *st = &w->stats;
     bt_bodies *b = &w->bodies;
     double t0 = bt_clock();
@@ -241,28 +221,29 @@ static void solve_contacts(bt_world *w)
     int64_t sweeps = 0, updates = 0, moves = 0, checks = 0;
     bool again = false;
     st->repeats = 0;
-    for (bool done = false; !done;) {
-        bt_contacts_detect(w, again); // gaps and J at X1
+    for (int round = 0;;) {
+        if (round == 0) bt_contacts_detect(w, again); // gaps and J at X1
         clock_phase(w, &st->phases.detect, &t0);
-        solve_passing(w);
-        clock_phase(w, &st->phases.solve, &t0);
+        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
         sweeps += st->sweeps;
         updates += st->unit_updates;
         moves += st->unit_moves;
         checks += st->residual_checks;
+        st->misjudged = st->converged ? bt_passing_review(w, round < MAX_RELEASES) : 0;
+        clock_phase(w, &st->phases.solve, &t0);
+        if (st->misjudged > 0 && round++ < MAX_ROUNDS) continue;
         fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
         st->outrun = bt_contacts_outrun(w);
-        done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
-        if (!done) {
-            st->repeats++;
-            again = !bt_cells_update(w, bt_margin_for(w, fastest));
-            if (!again) {
-                bt_contacts_bound(w, b->vel_start, b->vel_free, false);
-                bt_contacts_bound(w, b->vel, b->vel, true);
-            }
+        if (!st->outrun || !st->converged || st->repeats == MAX_REPEATS) break;
+        st->repeats++;
+        round = 0;
+        again = !bt_cells_update(w, bt_margin_for(w, fastest));
+        if (!again) {
+            bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+            bt_contacts_bound(w, b->vel, b->vel, true);
         }
-        clock_phase(w, &st->phases.detect, &t0);
     }
+    clock_phase(w, &st->phases.detect, &t0);
     st->phases.detect -= st->phases.colour; // which it holds
     st->sweeps = sweeps;
     st->unit_updates = updates;

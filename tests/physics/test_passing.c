@@ -3,7 +3,7 @@
 // outlines at many instants of the step.
 #include "scene.h"
 
-#include "contact/passing.h"
+#include "contact/pack.h"
 #include "geometry/sweep.h"
 
 enum { INSTANTS = 1500 };
