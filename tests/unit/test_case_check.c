@@ -134,7 +134,7 @@ static void cross_checks_let_pass(void **state)
         "tow.mode=line;body.vx=1",
         "tow.speed=0",
         "ice.concentration=0;ice.size=1 mm",
-        "domain.sides=open;body.length=11;body.x=12",
+        "domain.sides=open;body.length=9.9;body.x=12",
         "domain.sides_closing=0.4",
         "body.vertices=none",
         "body.x=none",

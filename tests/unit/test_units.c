@@ -103,7 +103,7 @@ static void refuses_what_is_not_a_number_with_a_unit_of_the_kind(void **state)
         {"1e308 km", BT_UNIT_LENGTH, "too large"},
         {"", BT_UNIT_LENGTH, "is not a number"},
         {"m", BT_UNIT_LENGTH, "is not a number"},
-        {"1,5 m", BT_UNIT_LENGTH, "\",5 m\""},
+        {"1,5 m", BT_UNIT_LENGTH, "1,5 m has a comma; write decimals with a point"},
         {"1 000 m", BT_UNIT_LENGTH, "\"000 m\""},
         {"1 m m", BT_UNIT_LENGTH, "\"m m\""},
         {"1e", BT_UNIT_NONE, "\"e\""},
