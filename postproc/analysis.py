@@ -9,9 +9,9 @@ import json
 import os
 from pathlib import Path
 
+import command  # isort: skip  # it says which package is missing
 import budget_text
 import capability_text
-import command
 import converge_text
 from bergtow_read import RunError
 from case_runs import above_zero

@@ -14,6 +14,7 @@
 
 #include "bergtow/fclib.h"
 #include "contact/law.h"
+#include "contact/pack.h"
 #include "space/cells.h"
 #include "solve/limit.h"
 
@@ -83,6 +84,7 @@ static row *rows_of(const bt_world *w, int *n)
         for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
             const bt_contact *u = &ts->cell[k].contacts[j];
             const double total = u->ln[0] + u->ln[1];
+            if (ts->cell[k].gaps[j].row == BT_ROW_RELEASED) continue; // the two pass each other
             if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->cell[k], j);
             for (int i = 0; i < u->n; i++) // one friction for both: distributed like the normal impulses
                 rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a],

@@ -386,7 +386,7 @@ def test_the_record_of_a_member_is_that_of_its_study(tmp_path):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0)])
     member, study = folder / "members/c001-r001", Ensemble(folder).study.encode()
     assert soundness.fault_of_member(member, "c001-r001", study) is None
-    assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "study changed since it finished"
+    assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "its record `finished` is of another run"
 
 
 def test_a_damaged_ensemble_file_is_refused(tmp_path):

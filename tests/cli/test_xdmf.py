@@ -193,7 +193,8 @@ SEVEN = np.array([[0, 0], [0, -10], [50, -10], [50, -40], [60, -40], [60, 0]]) /
 
 
 @pytest.mark.parametrize("case, crs, place", [
-    (FAR, None, None), (changed(FAR, domain__frame="geographic"), None, None),
+    (FAR, None, None),
+    (changed(FAR, domain__frame="geographic", domain__ends="wall", domain__sides="wall"), None, None),
     (NORTH, "EPSG:32633", (560e3, 8490e3)), (NORTH, "EPSG:4326", (17.25, 76.5)),
     (NORTH, "urn:x-bergtow:crs:local-metres-east-north", (0, 0)),
     (changed(NORTH, domain={**NORTH["domain"], "x0": 4900, "y0": -2100}), "EPSG:32633", (560e3 + 2e3, 8490e3 - 5e3))])

@@ -58,7 +58,7 @@ def test_everything_at_once(tmp_path):
     ranks."""
     path = with_bays(tmp_path, ALL)
     case = json.loads(path.read_text())
-    case["ice"] |= {"crushing": ALL["ice"]["crushing"]}
+    case["ice"] |= {"size": 1, "crushing": ALL["ice"]["crushing"]}
     path.write_text(json.dumps(case))
     done(1, "run", path, "-o", "whole", "--quiet", "--threads", 1, cwd=tmp_path)
     done(2, "run", path, "-o", "cut", "--quiet", "--threads", 1, "--steps", 131, cwd=tmp_path)
