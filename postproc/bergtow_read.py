@@ -36,7 +36,7 @@ USAGE, CASE, IO, SIGNAL = 2, 3, 4, 6
 
 
 def notes(found):
-    """Warnings or reasons of a summary, [{"code", "text", "values"}]; what is no such entry is left out."""
+    """Warnings or reasons of a summary, [{"code", "text", "values"}]; other entries are left out."""
     return [{"code": str(note.get("code")), "text": str(note.get("text", "")), "values": note.get("values") or {}}
             for note in (found if isinstance(found, list) else ()) if isinstance(note, dict)]
 

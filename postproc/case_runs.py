@@ -176,7 +176,7 @@ class CaseRuns:
         self._told.add(what)
 
     def call(self, *words):
-        """Exit code and messages of a run, or of what is left of it; and whether it met its limit of wall time."""
+        """Run the program within the time left; its exit code and messages, and whether it met that limit."""
         began = time.monotonic()
         left = round(max(1.0, self.last - began), 3)
         code, said = self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
@@ -249,8 +249,8 @@ class CaseRuns:
                            "what was found is without it; mend what made it fail", code)
 
     def refuse_copies(self, name, fields):
-        """Errors: RunError where two of these fields are the same run: what is decided by their scatter would be
-        decided by none. Without floes there is none, and that is true of every field."""
+        """Errors: RunError where two of these fields are the same run, whose scatter is none and decides nothing.
+        Fields without floes are alike, and pass."""
         try:
             ends = [json.loads((self.path(name, i) / "summary.json").read_text()) for i in fields[:2]]
         except (OSError, ValueError) as error:  # where no record tells
