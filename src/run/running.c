@@ -287,7 +287,9 @@ static void step_at_pace(bt_world *w, bt_pace *p)
     const double wall = bt_clock(), cpu = processor_time();
     bt_world_step(w);
     // not in the step itself: fields are shaken by steps that are not meant to converge
-    w->stats.locked = !w->stats.converged && bt_locked(w);
+    const bt_lock lock = w->stats.converged ? (bt_lock){0} : bt_locked(w);
+    w->stats.locked = lock.found;
+    w->stats.no_load = lock.towed;
     bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
 }
 

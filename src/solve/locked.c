@@ -3,15 +3,30 @@
 #include "solve/locked.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
-#include "contact/law.h"
 #include "contact/row.h"
 #include "partition/domain.h"
 #include "solve/islands.h"
+#include "solve/kernel.h"
 #include "solve/solver.h"
 #include "space/phases.h"
+
+/// A contact whose load has no bound, with the load λ of the proof.
+typedef struct {
+    bt_contact u;    ///< without its bias; friction 0 where the proof takes none
+    double bias[2];
+    double at_first; ///< sum of the normal impulses that the sweeps have come to, N s
+} hard;
+
+/// Those of this rank: cell k has contact[first[k]] to contact[first[k + 1] − 1].
+typedef struct {
+    hard *contact;
+    bt_idx *first;
+    double closing; ///< the largest speed of closing without loads, m/s
+} loads;
 
 /// Does it bear load, and any load?
 static bool is_hard(const bt_cell *cell, bt_idx j)
@@ -22,6 +37,37 @@ static bool is_hard(const bt_cell *cell, bt_idx j)
     return !k || !(isfinite(k->most[0]) || (u->n > 1 && isfinite(k->most[1])));
 }
 
+/// The contacts of this rank, and how fast they would close.
+static loads collect(const bt_world *w)
+{
+    const bt_cells *cells = w->cells;
+    const bt_vel *at_first = w->bodies.vel_free;
+    loads l = {.first = bt_alloc((size_t)cells->n + 1, sizeof *l.first), .closing = w->par.tolerance};
+    bool *works = bt_alloc((size_t)cells->n, sizeof *works);
+    size_t n = 0;
+    for (bt_idx i = 0; i < cells->n_order; i++) {
+        works[cells->order[i]] = true;
+        n += (size_t)cells->cell[cells->order[i]].n_contacts;
+    }
+    l.contact = bt_alloc(n + 1, sizeof *l.contact);
+    for (bt_idx k = 0; k < cells->n; k++) {
+        const bt_cell *cell = &cells->cell[k];
+        l.first[k + 1] = l.first[k];
+        for (bt_idx j = 0; works[k] && j < cell->n_contacts; j++) {
+            if (!is_hard(cell, j)) continue;
+            const bt_contact *u = &cell->contacts[j];
+            hard *h = &l.contact[l.first[k + 1]++];
+            *h = (hard){*u, {u->bias[0], u->bias[1]}, u->ln[0] + u->ln[1]};
+            h->u.bias[0] = h->u.bias[1] = 0;
+            for (int c = 0; c < u->n; c++)
+                l.closing = bt_max(l.closing, -bt_normal_velocity(u, c, &at_first[u->a], &at_first[u->b]));
+        }
+    }
+    free(works);
+    bt_domain_maxima(w, &l.closing, 1);
+    return l;
+}
+
 static void no_change(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)context, (void)t;
@@ -29,43 +75,65 @@ static void no_change(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     memset(w->solver->shift + cell->first, 0, (size_t)(cell->end - cell->first) * sizeof *w->solver->shift);
 }
 
-/// M⁻¹Jᵀλ, and how fast contacts would close.
 static void push(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    (void)context;
-    const bt_cell *cell = &w->cells->cell[k];
+    (void)t;
+    const loads *l = context;
     bt_vel *change = w->solver->shift;
-    const bt_vel *free = w->bodies.vel_free;
     const bt_inv *inv = w->bodies.inv;
-    for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        if (!is_hard(cell, j)) continue;
-        const bt_contact *u = &cell->contacts[j];
-        for (int c = 0; c < u->n; c++)
-            t->most = bt_max(t->most, -bt_normal_velocity(u, c, &free[u->a], &free[u->b]));
+    for (bt_idx i = l->first[k]; i < l->first[k + 1]; i++) {
+        const bt_contact *u = &l->contact[i].u;
         bt_vel va = change[u->a], vb = change[u->b];
         bt_apply(u, u->ln[0] + u->ln[1], u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1],
-                 u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], 0, inv[u->a], inv[u->b], &va, &vb);
+                 u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, inv[u->a], inv[u->b], &va, &vb);
         bt_store(&change[u->a], inv[u->a], &va);
         bt_store(&change[u->b], inv[u->b], &vb);
     }
 }
 
-/// A of each island into share.
-static void approach(bt_world *w, bt_islands *s)
+/// M⁻¹Jᵀλ into the array of the position projection.
+static void form_change(bt_world *w, const loads *l)
 {
-    const bt_cells *ts = w->cells;
+    bt_totals t = {0};
+    bt_phases_everywhere(w, no_change, NULL);
+    bt_phases_run(w, push, l, w->solver->shift, &t);
+    bt_domain_settle(w, w->solver->shift);
+}
+
+static void relax(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    const loads *l = context;
+    for (bt_idx i = l->first[k]; i < l->first[k + 1]; i++) {
+        bt_contact *u = &l->contact[i].u;
+        const bt_mass m = bt_mass_of(u, w->bodies.inv);
+        t->most = bt_max(t->most, bt_update_contact(u, &m, NULL, w->solver->shift, w->bodies.inv));
+    }
+}
+
+/// λ to loads that balance each other, with the friction of contacts that stick: sweeps of the same problem with all
+/// that drives it at rest.
+static void balance(bt_world *w, const loads *l)
+{
+    form_change(w, l);
+    for (int sweep = 0; sweep < BT_LOCKED_SWEEPS; sweep++) {
+        bt_totals t = {0};
+        bt_phases_run(w, relax, l, w->solver->shift, &t);
+        bt_domain_maxima(w, &t.most, 1);
+        if (t.most <= BT_LOCKED_AT_REST * l->closing) break;
+    }
+}
+
+/// A of each island into share.
+static void approach(bt_world *w, bt_islands *s, const loads *l)
+{
     const bt_vel *v = w->bodies.vel;
     bt_islands_clear(w, s);
-    for (bt_idx i = 0; i < ts->n_order; i++) {
-        const bt_cell *cell = &ts->cell[ts->order[i]];
-        for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            if (!is_hard(cell, j)) continue;
-            const bt_contact *u = &cell->contacts[j];
-            double power = 0;
-            for (int c = 0; c < u->n; c++)
-                power -= u->ln[c] * (bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c]);
-            bt_sum_add(&s->sum[bt_islands_of(w, s, u)], power);
-        }
+    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
+        const bt_contact *u = &l->contact[i].u;
+        double power = -u->lt * bt_tangent_velocity(u, &v[u->a], &v[u->b]);
+        for (int c = 0; c < u->n; c++)
+            power -= u->ln[c] * (bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + l->contact[i].bias[c]);
+        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], power);
     }
     bt_islands_add(w, s);
     for (bt_idx i = 0; i < w->bodies.n; i++) s->share[i] = bt_sum_value(&s->sum[i]);
@@ -89,21 +157,88 @@ static void imbalance(bt_world *w, bt_islands *s)
     bt_islands_add(w, s);
 }
 
-bool bt_locked(bt_world *w)
+/// Strike out islands whose A is no more than `speed` times their sum.
+static void keep_above(bt_world *w, bt_islands *s, double speed)
+{
+    for (bt_idx i = 0; i < w->bodies.n; i++)
+        if (!(s->share[i] > speed * bt_sum_value(&s->sum[i]))) s->share[i] = 0;
+}
+
+/// Strike out islands whose loads close by no more than the tolerance, or are not those that the sweeps have come to.
+static void keep_grown(bt_world *w, bt_islands *s, const loads *l)
+{
+    bt_islands_clear(w, s);
+    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
+        const bt_contact *u = &l->contact[i].u;
+        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], u->ln[0] + u->ln[1]);
+    }
+    bt_islands_add(w, s);
+    keep_above(w, s, w->par.tolerance);
+    bt_islands_clear(w, s);
+    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
+        const bt_contact *u = &l->contact[i].u;
+        const double was = l->contact[i].at_first;
+        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], fabs(u->ln[0] + u->ln[1] - was) - BT_LOCKED_OTHER * was);
+    }
+    bt_islands_add(w, s);
+    for (bt_idx i = 0; i < w->bodies.n; i++)
+        if (bt_sum_value(&s->sum[i]) > 0) s->share[i] = 0;
+}
+
+/// A of the islands in which A/P is beyond what gives way into share, 0 for all others.
+static void mark(bt_world *w, bt_islands *s, const loads *l)
+{
+    form_change(w, l);
+    approach(w, s, l);
+    imbalance(w, s);
+    keep_above(w, s, BT_LOCKED_SPEEDS * l->closing);
+}
+
+/// Is an island marked, and one that presses on the towed body?
+static bt_lock marked(const bt_world *w, bt_islands *s, const loads *l)
+{
+    const bt_idx towed = bt_world_towed(w);
+    double found[2] = {0};
+    for (bt_idx i = 0; i < w->bodies.n; i++)
+        if (s->root[i] == i && s->share[i] > 0) found[0] = 1;
+    for (bt_idx i = 0; towed >= 0 && i < l->first[w->cells->n]; i++) {
+        const bt_contact *u = &l->contact[i].u;
+        if ((u->a == towed || u->b == towed) && s->share[bt_islands_of(w, s, u)] > 0) found[1] = 1;
+    }
+    bt_domain_maxima(w, found, 2);
+    return (bt_lock){found[0] > 0, found[1] > 0};
+}
+
+/// Friction of the contacts that stick, or of none, is in the proof.
+static void take_friction(const bt_world *w, const loads *l, bool sticking)
+{
+    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
+        bt_contact *u = &l->contact[i].u;
+        if (!sticking || fabs(u->lt) > BT_LOCKED_STICKS * u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;
+    }
+}
+
+bt_lock bt_locked(bt_world *w)
 {
     bt_islands *s = w->solver->islands;
-    bt_totals t = {.most = w->par.tolerance};
+    const loads l = collect(w);
     bt_solver_make_shift(w);
-    bt_phases_everywhere(w, no_change, NULL);
-    bt_phases_run(w, push, NULL, w->solver->shift, &t);
-    bt_domain_maxima(w, &t.most, 1);
-    bt_domain_settle(w, w->solver->shift);
     bt_islands_make(w, s, is_hard);
-    approach(w, s);
-    imbalance(w, s);
-    double found = 0;
-    for (bt_idx i = 0; i < w->bodies.n; i++)
-        if (s->root[i] == i && s->share[i] > BT_LOCKED_SPEEDS * t.most * bt_sum_value(&s->sum[i])) found = 1;
-    bt_domain_maxima(w, &found, 1);
-    return found > 0;
+    const size_t n = (size_t)l.first[w->cells->n];
+    hard *as_found = bt_alloc(n + 1, sizeof *as_found);
+    memcpy(as_found, l.contact, n * sizeof *as_found);
+    take_friction(w, &l, false);
+    mark(w, s, &l);
+    bt_lock lock = marked(w, s, &l);
+    if (!lock.towed) {
+        memcpy(l.contact, as_found, n * sizeof *as_found);
+        take_friction(w, &l, true);
+        balance(w, &l);
+        mark(w, s, &l);
+        keep_grown(w, s, &l);
+        const bt_lock held = marked(w, s, &l);
+        lock = (bt_lock){lock.found || held.found, held.towed};
+    }
+    free(l.contact), free(l.first), free(as_found);
+    return lock;
 }

@@ -26,17 +26,28 @@
 
 #include "bergtow/world.h"
 
-/// Of the largest speed with which contacts would close without loads: U' that is faster is none that ice takes,
-/// assumed.
+/// Factor on the largest closing speed without loads: bodies that part faster than this are not physical, assumed.
 #define BT_LOCKED_SPEEDS 10
+/// Of the friction bound: a contact that bears less sticks, assumed.
+#define BT_LOCKED_STICKS 0.99
+/// Of the normal impulses: by so much may balanced loads differ from those that the sweeps have come to, assumed.
+#define BT_LOCKED_OTHER 0.1
+/// Sweeps that balance the loads at most, and the change of speed, over the closing speed, that ends them.
+#define BT_LOCKED_SWEEPS 400
+#define BT_LOCKED_AT_REST 1e-12
 /// What helps, in the words of a message.
 #define BT_LOCKED_REMEDY                                                                                               \
     "let ice give way (ice.rafting.kappa, ice.crushing.pressure), tow by a line or a vessel (tow.mode), or move the "  \
     "walls away"
 
-/// Collective. After a solution that has not converged: is there an island in which |U' − U| is beyond
-/// BT_LOCKED_SPEEDS?
-/// Uses the array of the position projection; impulses and velocities stay.
-bool bt_locked(bt_world *w);
+/// Bodies without a way out.
+typedef struct bt_lock {
+    bool found;  ///< in some island
+    bool towed;  ///< in one that presses on the towed body, or holds it
+} bt_lock;
+
+/// Collective. After a solution that has not converged. Uses the array of the position projection; impulses and
+/// velocities stay.
+bt_lock bt_locked(bt_world *w);
 
 #endif
