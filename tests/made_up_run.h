@@ -82,7 +82,7 @@ static inline bt_sample sample(int step)
     s.contacts = 8 + step % 2;
     s.sweeps = 5;
     s.residual = 1e-6;
-    s.unconverged = s.unprojected = s.locked = 0;
+    s.unconverged = s.unprojected = s.locked = s.no_load = 0;
     s.overlap = 1e-4;
     s.momentum_residual = 1e-15;
     s.kinetic_energy = 100;

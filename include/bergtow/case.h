@@ -225,6 +225,7 @@ typedef struct bt_case {
         double overlap;          ///< / mean floe size
         double energy;           ///< / what the case can drive the bodies to
         int64_t unconverged;     ///< steps in a row
+        double no_solution;      ///< share of the steps of the case
         bool escape;             ///< a floe beyond a wall
     } guard;
     struct {

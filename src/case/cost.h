@@ -9,8 +9,8 @@
 
 /// What the layers above write, for the estimate of their size; each is held to it where it is defined.
 enum {
-    BT_COST_SERIES = 80,      ///< series of a run
-    BT_COST_COLUMNS = 24,     ///< of them kept in memory from every step
+    BT_COST_SERIES = 81,      ///< series of a run
+    BT_COST_COLUMNS = 25,     ///< of them kept in memory from every step
     BT_COST_PANEL_BYTES = 32, ///< a block of the loads of one panel
 };
 

@@ -413,6 +413,9 @@ bt_key bt_case_keys[] = {
          "can drive them to, that ends the run; 0 = no limit; assumed"),
     INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]",
         "steps in a row without convergence that end the run, 0 = no limit; assumed"),
+    REAL("guard.no_solution", guard.no_solution, RATIO, "10 %", "[0, 1]",
+         "share of the steps of the case in which bodies cannot give way to any load, above which the run ends; "
+         "0 = no limit; assumed"),
     BOOL("guard.escape", guard.escape, "true", "a floe or the towed body beyond a wall of the domain ends the run"),
 
     CHOICE("impact.conversion", impact.conversion, conversions, "duration",

@@ -40,6 +40,7 @@
     ROW(FLOES_KEPT, "floes_kept", "share_percent", "disturbed floes came back ahead of the moving window")             \
     /* reasons of a verdict alone */                                                                                   \
     ROW(SETTLING, "settling", "- from_s start_s", "a reported force still settles where the window begins")            \
+    ROW(NO_LOAD, "no_load", "share_percent", "the load of the body has no bound in some steps of the window")          \
     ROW(UNCONVERGED_SHARE, "unconverged_share", "share_percent limit_percent", "too many steps did not converge")      \
     ROW(RESIDUAL, "residual", "residual_m_s limit speed_m_s", "a step was left far from its solution")                 \
     ROW(COURSE_CHANGES, "course_changes", "angle_deg waypoint", "the course changes within the window")                \

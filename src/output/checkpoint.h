@@ -60,7 +60,7 @@
 //                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
 //                     D the rest
-//   bt_guard          S in_a_row, energy
+//   bt_guard          S in_a_row, locked, energy
 //                     D the rest
 //   bt_domain         not state: which rank owns what affects no bit
 //   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: no counter

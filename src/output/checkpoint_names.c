@@ -169,6 +169,7 @@ static const row rows[] = {
     {"record/merged", "1", "series of the sample under way, each in its own unit", "series"},
     {"run/frames_due", "1", "frames that are due so far", "one"},
     {"run/unconverged_in_a_row", "1", "steps without convergence one after the other", "one"},
+    {"run/locked_steps", "1", "steps without a solution", "one"},
     {"run/energy_limit", "J", "of the bodies, by guard.energy and what drives them at the start; 0 without", "one"},
     // of every step, and totals
     {"history/time", "s", "end of each step", "time"},
@@ -196,6 +197,7 @@ static const row rows[] = {
     {"history/body_vx", "m/s", "velocity of the body over ground, x, in each step", "time"},
     {"history/body_vy", "m/s", "the same, y", "time"},
     {"history/body_yaw", "rad", "yaw of the towed body", "time"},
+    {"history/no_load", "1", "1 = the load of the body had no bound in the step", "time"},
     {"history/sum_contacts", "1", "contact points, sum over the steps", "one"},
     {"history/sum_sweeps", "1", "sweeps, sum over the steps", "one"},
     {"history/sum_updates", "1", "updates of contacts, sum over the steps", "one"},
@@ -208,6 +210,7 @@ static const row rows[] = {
     {"history/max_residual", "m/s", "largest residual of the solver so far", "one"},
     {"history/unconverged", "1", "steps that did not converge", "one"},
     {"history/locked_steps", "1", "of them, steps in which some bodies could not give way", "one"},
+    {"history/no_load_steps", "1", "of these, steps in which the load of the towed body had no bound", "one"},
     {"history/unprojected", "1", "steps whose overlap was not removed", "one"},
     {"history/positive_work", "1", "steps in which contacts added energy", "one"},
     {"history/restitution_cut", "1", "steps in which rebounds were lowered", "one"},

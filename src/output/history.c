@@ -40,6 +40,7 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_VX, "body_vx", body_vx),
     COLUMN(BT_COL_VY, "body_vy", body_vy),
     COLUMN(BT_COL_YAW, "body_yaw", body_yaw),
+    COLUMN(BT_COL_NO_LOAD, "no_load", no_load),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)
@@ -73,6 +74,7 @@ static const bt_total totals[] = {
     TOTAL(F64, max_residual, MAX, residual),
     TOTAL(I64, unconverged, STEPS, unconverged),
     LATER(F64, locked_steps, STEPS, locked, UNKNOWN),
+    LATER(F64, no_load_steps, STEPS, no_load, UNKNOWN),
     TOTAL(I64, unprojected, STEPS, unprojected),
     TOTAL(I64, positive_work, STEPS, added_energy),
     TOTAL(I64, restitution_cut, STEPS, restitution_cut),
@@ -147,6 +149,11 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
         h->column[k][h->n] = *(const double *)(const void *)((const char *)s + columns[k].offset);
+    static const bt_column loads[] = {BT_COL_ICE, BT_COL_TOW, BT_COL_BUDGET, BT_COL_QUASI_STATIC};
+    for (size_t i = 0; s->no_load != 0 && i < sizeof loads / sizeof *loads; i++) {
+        double *x = h->column[loads[i]] + h->n;
+        if (isnan(*x)) *x = h->n > 0 ? x[-1] : 0;
+    }
     for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
         h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
     h->n++;

@@ -33,10 +33,13 @@ typedef enum bt_column {
     BT_COL_VX, ///< over ground
     BT_COL_VY,
     BT_COL_YAW,
+    BT_COL_NO_LOAD,
     BT_N_COLUMNS
 } bt_column;
 
-/// What the summary keeps of every step, whatever output.sample_every says: 192 bytes a step.
+/// A load that is no number (bt_sample.no_load) is kept as the last one before it, 0 at the start: it has no bound, so
+/// any number is below it, and means, percentiles and peaks of what is kept are the least that they can be.
+/// What the summary keeps of every step, whatever output.sample_every says: 200 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity
@@ -45,7 +48,7 @@ typedef struct bt_history {
     // running totals: bt_history_total
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, sum_checks, sum_projected, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
-    double locked_steps;
+    double locked_steps, no_load_steps;
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun, misjudged;
     bt_total_value laws[BT_MAX_LAW_TOTALS]; ///< of the contact laws, in their order (contact/law.h)
 } bt_history;

@@ -126,18 +126,21 @@ void bt_impact_store_take_closed(bt_impact_store *s)
     if (s->n_rows >= CHUNK) write_rows(s);
 }
 
-void bt_impact_store_take(bt_impact_store *s, double time)
+void bt_impact_store_take(bt_impact_store *s, double time, bool no_load)
 {
     if (!s->h) return;
     bt_impact_store_take_closed(s);
-    bt_panel_blocks_add(&s->blocks, s->from->panels.panel, time < s->earliest);
+    bt_panel *none = no_load ? bt_alloc((size_t)s->n_panels, sizeof *none) : NULL;
+    const bt_panel *panels = no_load ? none : s->from->panels.panel;
+    bt_panel_blocks_add(&s->blocks, panels, time < s->earliest);
     for (int k = 0; k < s->n_panels; k++) {
-        const bt_panel *p = &s->from->panels.panel[k];
+        const bt_panel *p = &panels[k];
         s->sum[3 * k] += p->fx;
         s->sum[3 * k + 1] += p->fy;
         s->sum[3 * k + 2] += p->normal;
     }
     s->n_merged++;
+    free(none);
 }
 
 void bt_impact_store_end_sample(bt_impact_store *s)

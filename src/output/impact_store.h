@@ -31,8 +31,9 @@ typedef struct bt_impact_store {
 
 /// Make the groups of case c. With output.panels the panel loads of every sample are in them.
 void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c);
-/// Collisions that ended in the last step, and its panel loads; time: its end, s.
-void bt_impact_store_take(bt_impact_store *s, double time);
+/// Collisions that ended in the last step, and its panel loads; time: its end, s. no_load: they are no numbers, and
+/// count as none.
+void bt_impact_store_take(bt_impact_store *s, double time, bool no_load);
 /// Collisions alone: those that the end of the run has closed.
 void bt_impact_store_take_closed(bt_impact_store *s);
 /// The present sample is complete.

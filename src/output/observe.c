@@ -229,6 +229,7 @@ void bt_observe(bt_world *w, double reference_speed, bt_sample *s)
         s->window_waiting = (double)w->window->waiting;
     }
     observe_rows(w, has, s);
+    if (w->stats.no_load) bt_sample_lose_load(s, !bt_tow_has_line(w->tow) && w->tow->mode == BT_TOW_SPEED);
 }
 
 double bt_observe_ice_area(const bt_world *w)

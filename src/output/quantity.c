@@ -73,11 +73,33 @@ const char *bt_balance_words(void)
     return words = bt_text_end(&text);
 }
 
+/// What contacts do to the towed body: no numbers in a step without a load.
+static const size_t loads[] = {
+    offsetof(bt_sample, ice_resistance), offsetof(bt_sample, ice_force_x), offsetof(bt_sample, ice_force_y),
+    offsetof(bt_sample, ice_moment), offsetof(bt_sample, ice_resistance_budget), offsetof(bt_sample, largest_push),
+    offsetof(bt_sample, tow_force), // the last: not on a line
+};
+enum { N_LOADS = sizeof loads / sizeof *loads };
+
+void bt_sample_lose_load(bt_sample *s, bool prescribed)
+{
+    for (int k = 0; k < N_LOADS - !prescribed; k++)
+        memcpy((char *)s + loads[k], &(double){NAN}, sizeof(double));
+}
+
+static bool is_load(const bt_quantity *q)
+{
+    bool found = false;
+    for (int k = 0; k < N_LOADS; k++) found = found || q->offset == loads[k];
+    return found;
+}
+
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)
 {
     for (int k = 0, n = bt_n_series(); k < n; k++) {
         const bt_quantity *q = bt_series(k);
         const double x = bt_sample_value(s, q);
+        if (s->no_load != 0 && isnan(x) && is_load(q)) continue;
         if (has & 1u << q->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return q;
     }
     return NULL;

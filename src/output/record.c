@@ -257,7 +257,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
     r->h5.err = err;
     bt_history_add(&r->history, s);
-    bt_impact_store_take(&r->impacts, s->time);
+    bt_impact_store_take(&r->impacts, s->time, s->no_load != 0);
     for (int k = 0; k < r->n_series; k++) {
         const bt_quantity *q = bt_series(k);
         double *m = &r->merged[k];

@@ -55,6 +55,7 @@ typedef struct bt_sample {
     double active;          ///< floes in cells whose contacts were looked at; the others rest
     double unconverged;     ///< 1 if the limit of work came before the tolerance
     double locked;          ///< 1 if some bodies could not give way to any load, either
+    double no_load;         ///< 1 if these press on the towed body: its contact forces are no numbers, NaN
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
     double kinetic_energy;  ///< of all dynamic bodies, J
@@ -111,6 +112,10 @@ static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double valu
 /// sample is sound.
 /// has: bit 1 << k for each bt_applies k of the run.
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
+
+/// The contact forces of a step in which the load of the towed body has no bound (solve/locked.h) become NaN. The tow
+/// force is one of them at a prescribed speed, and stays a number on a line.
+void bt_sample_lose_load(bt_sample *s, bool prescribed);
 
 struct bt_impacts;
 

@@ -97,6 +97,8 @@ void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t 
         for (int64_t i = 0; i < n && old->status == BT_OK; i++) {
             const double entry = entry_of(q->keep, r->history.column[kept[j].column] + i * every, every);
             if (entry == x[i] || (isnan(entry) && isnan(x[i]))) continue;
+            const bool lost = entry_of(BT_KEEP_MAX, r->history.column[BT_COL_NO_LOAD] + i * every, every) > 0;
+            if (lost && isnan(x[i])) continue;
             char *why = bt_text_of("/series/%s is %.17g in entry %lld, where the run had %.17g", q->name, x[i],
                                    (long long)i, entry);
             refuse(old, s, why);

@@ -143,6 +143,9 @@ const bt_quantity bt_own_series[] = {
     AT(stats.locked, locked, ALWAYS, SUM, "1",
         "of these, steps in which some bodies could not give way to any load: their loads have no bound", NONE, NULL,
         "locked_steps"),
+    AT(stats.no_load, no_load, ALWAYS, SUM, "1",
+        "of these, steps in which they press on the towed body: its contact forces are no numbers, NaN in the series",
+        NONE, NULL, "no_load_steps"),
     AT(stats.overlap, overlap, ALWAYS, MAX, "m",
         "deepest overlap of two bodies at the start of the step; what was crushed or lies over each other by rafting "
         "is left out", DIAGNOSTIC, "deepest overlap", "max_overlap_m"),

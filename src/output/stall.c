@@ -18,7 +18,7 @@ void bt_stall_add(bt_stall *s, double asked, double dt, const double at[2], doub
     if (!(asked > 0)) return; // a tow that holds asks for nothing
     s->asked += asked;
     s->spent += dt;
-    s->ice += ice * dt;
+    s->ice += (isnan(ice) ? pull : ice) * dt; // no number: beyond any pull
     s->pull += pull * dt;
     if (s->asked < path) return;
     const double way = bt_hypot(at[0] - s->from_x, at[1] - s->from_y);

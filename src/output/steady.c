@@ -182,6 +182,7 @@ static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
     if (ice->sd == 0 && ice->mean == 0 && t->concentration > 0) ice->se = ice->low = ice->high = NAN;
     for (int64_t i = s->first; i < h->n; i++) {
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
+        s->no_load += (h->column[BT_COL_NO_LOAD][i] > 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
     }
 }
@@ -208,6 +209,12 @@ void bt_steady_none(bt_steady *s)
 static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
     const double speed = t->tolerance / c->solver.tolerance;
+    s->at_least = s->no_load > 0;
+    if (s->at_least)
+        bt_warn(because(s, BT_NOT_STEADY), BT_WARN_NO_LOAD,
+                "%.3g %% of the steps in the window have no solution that bounds the load of the body, so its means, "
+                "percentiles and peaks are lower bounds: let ice give way, or do not use them",
+                100 * s->no_load);
     if (s->unconverged > BT_STEADY_UNCONVERGED)
         bt_warn(because(s, BT_NOT_STEADY), BT_WARN_UNCONVERGED_SHARE,
                 "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise "

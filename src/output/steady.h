@@ -67,6 +67,8 @@ typedef struct bt_steady {
     double correlation_time;      ///< of the ice resistance, s
     double unconverged;           ///< share of the steps in the window that did not converge
     double residual;              ///< largest of them, m/s
+    double no_load;               ///< share of the steps in the window in which the load of the body is no number
+    bool at_least;                ///< there are such steps: means, percentiles and peaks of the loads are lower bounds
     double stretches;             ///< of contact with ice that the mean is worth, INFINITY where it hardly varies
     bool met_no_ice;              ///< there is ice, and none has touched the body within the window
     bool given;                   ///< by output.window_start, not found

@@ -97,6 +97,7 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     s->budget_closure_relative = largest > 0 ? other / largest : other == 0 ? 0 : NAN;
     if (n == 0) return;
 
+    if (s->window.at_least) return; // neither balance is one of numbers
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
         bt_warn(&s->warnings, BT_WARN_BODY_BALANCE,
                 "the mean ice resistance differs from %s by %.2g of the largest of them; the momentum balance of "
@@ -156,7 +157,7 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c,
     if (h->locked_steps > 0)
         bt_warn(&s->warnings, BT_WARN_LOCKED,
                 "in %.0f of %lld steps bodies were locked between others that give way to nothing (walls, a body "
-                "at a given speed): no bounded load keeps them apart, and the forces of these steps are none; "
+                "at a given speed), so that no bounded load keeps them apart and their forces are no numbers: "
                 BT_LOCKED_REMEDY,
                 h->locked_steps, (long long)h->n);
     if (h->unprojected > 0)

@@ -62,6 +62,7 @@ static double n_stretches(const view *v)
     return number_or_nan(v->s->window.n && isfinite(v->s->window.stretches), v->s->window.stretches);
 }
 static double unconverged_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.unconverged); }
+static double no_load_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.no_load); }
 static double window_residual(const view *v) { return number_or_nan(v->s->window.n, v->s->window.residual); }
 static double peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, false); }
 static double start_peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, true); }
@@ -304,6 +305,10 @@ static const bt_json_key rows[] = {
     NUMBER("window.n_contact_stretches", n_stretches, "1",
         "equal stretches of contact with ice that the mean is worth; null where its resistance hardly varies"),
     OF_SUMMARY("window.correlation_time_s", window.correlation_time, "s", "correlation time of the ice resistance"),
+    NUMBER("window.no_load_share", no_load_share, "1",
+        "share of the steps in the window in which the load of the body has no bound"),
+    OF_SUMMARY("window.at_least", window.at_least, "1",
+        "there are such steps: means, intervals, percentiles and peaks of the loads are lower bounds"),
     NUMBER("window.unconverged_share", unconverged_share, "1",
         "share of the steps in the window that did not converge"),
     NUMBER("window.max_residual_m_s", window_residual, "m/s", "largest residual of a step in the window"),
@@ -350,6 +355,8 @@ static const bt_json_key rows[] = {
     OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the limit of work before the tolerance"),
     OF_HISTORY("locked_steps", locked_steps, "1",
         "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
+    OF_HISTORY("no_load_steps", no_load_steps, "1",
+        "of these, steps in which they press on the towed body: its load is no number"),
     OF_HISTORY("max_residual_m_s", max_residual, "m/s", "largest residual of the contact problem at the end of a step"),
     OF_TOTALS("tolerance_m_s", tolerance, "m/s", "residual at which the sweeps stop"),
     OF_SUMMARY("mean_sweeps", sweeps, "1", "sweeps of the contact solver in a step, mean over all steps"),

@@ -49,9 +49,13 @@ static void print_events(const bt_events *e)
         printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - BT_EVENTS_REPORTED);
 }
 
-static void print_mean(const char *label, const bt_mean *m)
+static void print_mean(const char *label, const bt_mean *m, bool at_least)
 {
     char a[32], b[32], d[32], e[32];
+    if (at_least) {
+        printf("  %-19s at least %s\n", label, bt_force_text(a, m->mean));
+        return;
+    }
     printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, bt_force_text(a, m->mean), bt_force_text(b, m->low),
            bt_force_text(d, m->high), bt_force_text(e, m->sd));
 }
@@ -99,27 +103,27 @@ static void print_forces(const bt_summary *s, const bt_case *c)
            w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     if (c->tow.mode == BT_TOW_NONE) printf("    ice resistance    none: nothing tows the body\n");
     else if (w->met_no_ice) printf("    ice resistance    none: the body met no ice\n");
-    else print_mean("  ice resistance", &s->ice);
+    else print_mean("  ice resistance", &s->ice, w->at_least);
     if (bt_case_reads_field(c) || bt_case_ice_is_random(c))
         printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
                bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s,", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
-    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95),
+    printf("    step means        %s95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", w->at_least ? "at least: " : "", bt_force_text(a, s->p95),
            bt_force_text(b, s->p99), bt_force_text(d, s->peak));
     if (w->series[BT_REPORTED_ICE].start_peak > s->peak)
         printf("      start           the largest, %s, lies before the window\n",
                bt_force_text(a, w->series[BT_REPORTED_ICE].start_peak));
     printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, s->balance),
            bt_balance_words(), bt_force_text(b, s->budget.mean));
-    print_mean("  tow force", &s->tow);
+    print_mean("  tow force", &s->tow, w->at_least && c->tow.mode == BT_TOW_SPEED);
     printf("    drag              %s\n", bt_force_text(a, s->drag.mean));
     print_added(s, true);
     for (int k = 0; k < N_OF_THE_LINE; k++) {
         const bt_reported *r = &w->series[of_the_line[k].series];
         if (isnan(r->peak) && isnan(r->start_peak)) continue;
-        if (r->present) print_mean(of_the_line[k].label, &r->mean);
+        if (r->present) print_mean(of_the_line[k].label, &r->mean, false);
         else printf("  %-19s none over the window: it has parted\n", of_the_line[k].label);
         printf("      peak            %s in the window", bt_force_text(a, r->peak));
         if (isfinite(r->start_peak)) printf(", %s in the start before it", bt_force_text(b, r->start_peak));

@@ -100,6 +100,7 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
         .overlap = c->guard.overlap * mean_size,
         .energy = c->guard.energy * driven_energy(c, w, n_floes),
         .unconverged = c->guard.unconverged,
+        .most_locked = c->guard.no_solution > 0 ? (int64_t)(c->guard.no_solution * (double)bt_case_steps(c)) : -1,
         .escape_x = c->guard.escape && c->domain.ends == BT_BOUND_WALL,
         .escape_y = c->guard.escape && c->domain.sides == BT_BOUND_WALL,
         .open_x = c->domain.ends == BT_BOUND_OPEN,
@@ -110,6 +111,7 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
         .n_floes = n_floes,
         .size = mean_size,
         .in_a_row = g->in_a_row,
+        .locked = g->locked,
         .broken = -1,
         .gone = -1,
     };
@@ -269,6 +271,14 @@ bt_status bt_guard_check(bt_guard *g, bt_world *w, const bt_sample *s, bt_errors
             s->locked != 0 ? "in the last, bodies are locked between others that give way to nothing: " BT_LOCKED_REMEDY
                            : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
                              "where ice jams");
+    }
+    g->locked += s->locked != 0;
+    if (g->most_locked >= 0 && g->locked > g->most_locked) {
+        sound = false;
+        bt_errors_add(err,
+                      "step %" PRId64 ": %" PRId64 " steps have no solution, since bodies are locked between others "
+                      "that give way to nothing, and guard.no_solution allows %" PRId64 ": " BT_LOCKED_REMEDY,
+                      w->step, g->locked, g->most_locked);
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

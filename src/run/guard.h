@@ -5,6 +5,7 @@
 //     guard.overlap       deepest overlap of two bodies / mean floe size
 //     guard.energy        kinetic energy of all bodies / the energy that the scene can drive them to
 //     guard.unconverged   steps in a row that met the limit of work
+//     guard.no_solution   steps in which bodies cannot give way to any load (solve/locked.h) / steps of the case
 //     guard.escape        a body whose centroid is beyond a wall
 // and, always, NaN or infinity, or a number where there must be NaN: in poses and velocities, in tow, window and
 // collisions, in what the series take (bt_sample_fault). 0 or false switches the others off. The limits are assumed:
@@ -46,6 +47,7 @@ typedef struct bt_guard {
     double overlap;         ///< m
     double energy;          ///< J; state: forces of a program may do something else by the time of a checkpoint
     int64_t unconverged;
+    int64_t most_locked;    ///< steps, −1 = no limit
     bool escape_x, escape_y;///< there are walls, and they are looked at
     bool open_x, open_y;    ///< open edges
     double low[2], high[2]; ///< of the domain at time zero, m
@@ -53,6 +55,7 @@ typedef struct bt_guard {
     bt_gid n_floes;
     double size;            ///< mean floe size, m
     int64_t in_a_row;       ///< state: steps in a row that did not converge
+    int64_t locked;         ///< state: steps without a solution
     /// of the last look: highest id on this rank of a body that is not finite, that is beyond a wall; −1 = none
     double broken, gone;
 } bt_guard;

@@ -93,6 +93,7 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_er
         bt_state_save_stall(&r->totals.stall, s);
         bt_snapshot_add_int(s, "run/frames_due", r->frames_due);
         bt_snapshot_add_int(s, "run/unconverged_in_a_row", r->guard.in_a_row);
+        bt_snapshot_add_int(s, "run/locked_steps", r->guard.locked);
         bt_snapshot_add_real(s, "run/energy_limit", r->guard.energy);
         bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
         bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->began);
@@ -183,6 +184,8 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
     check_frames(r, s);
     bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1,
                      "is no number of steps");
+    bt_snapshot_want(s, r->guard.locked >= 0 && r->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
+                     "is no number of steps");
     bt_snapshot_want(s, !(r->guard.energy < 0), "run/energy_limit", -1, "is no energy");
     bt_snapshot_want(s,
                      t->windows >= 0 && t->windows <= BT_MOST_STEPS &&
@@ -198,6 +201,7 @@ bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err)
     r->frames_due = bt_snapshot_int(s, "run/frames_due");
     r->frames = bt_snapshot_int(s, "record/frames");
     r->guard.in_a_row = bt_snapshot_int(s, "run/unconverged_in_a_row");
+    r->guard.locked = bt_snapshot_find(s, "run/locked_steps") ? bt_snapshot_int(s, "run/locked_steps") : 0;
     const bool limited = bt_snapshot_find(s, "run/energy_limit"); // not in checkpoints of before
     r->guard.energy = limited ? bt_snapshot_real(s, "run/energy_limit") : 0;
     const bool earlier = bt_snapshot_rows(s, "clock/phases") == N_PHASES - 1; // before the projection had its own
