@@ -31,6 +31,16 @@ def within(time, start, end):
     return there
 
 
+def least(x):
+    """A load that is no number in some steps (no_load) with the last number before each in its place, 0 at the start.
+    It has no bound there, so means and peaks of this are the least that they can be. A load without numbers stays."""
+    there = np.isfinite(x)
+    if there.all() or not there.any():
+        return x
+    last = np.maximum.accumulate(np.where(there, np.arange(len(x)), -1))
+    return np.where(last < 0, 0.0, x[np.maximum(last, 0)])
+
+
 #: exit codes, by the names of the library: of what was asked for, of the case, of a signal or a limit
 USAGE, CASE, IO, SIGNAL = 2, 3, 4, 6
 
@@ -424,6 +434,11 @@ class Run:
         for part in key.split("."):
             value = value.get(part) if isinstance(value, dict) else None
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
+
+    @property
+    def at_least(self):
+        """Are means and peaks of the loads over the window lower bounds, since steps in it have no solution?"""
+        return self.number("window.no_load_share", 0.0) > 0
 
     @property
     def events(self):

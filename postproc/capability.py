@@ -83,6 +83,9 @@ def trial(run, number, least):
     if np.sum(within(run["time"], *run.window)) < 2:
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
                        CASE)
+    if run.at_least:
+        raise RunError(run.path, "the load of the body has no bound in some steps of the window",
+                       "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
     # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted

@@ -100,8 +100,10 @@ def wider(run, k):
 
 
 def mean_resistance(run):
-    """NaN where the tow ends within the window: what comes after is no resistance to a tow."""
-    return run.number("mean_ice_resistance_n") if run.window and run.adrift >= run.window[1] else np.nan
+    """NaN where the tow ends within the window, since what comes after is no resistance to a tow, and where steps of it
+    have no solution: two lower bounds cannot be compared."""
+    towed = run.window and run.adrift >= run.window[1] and not run.at_least
+    return run.number("mean_ice_resistance_n") if towed else np.nan
 
 
 @dataclass(frozen=True)
@@ -228,6 +230,9 @@ def window(study, margin):
                 if run.adrift < run.window[1]:
                     return [{"name": "window", "key": "output.window_start", "judged": "open",
                              "why": "the line of a run parts before the end of its window"}]
+                if run.at_least:
+                    return [{"name": "window", "key": "output.window_start", "judged": "open",
+                             "why": "the load of a run has no bound in some steps of its window"}]
                 (start, end), t, x = run.window, run["time"], run["ice_resistance"]
                 first = start + (run.steps_per_sample - 1) * run.value("run.dt")
             middle = 0.5 * (start + end)

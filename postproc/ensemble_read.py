@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 import soundness
-from bergtow_read import Run, RunError, within
+from bergtow_read import Run, RunError, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 # samples, and stretches of contact, below which the program itself calls a window too short
@@ -33,6 +33,7 @@ LEAST_TOW = 150.0
 #: kinds of doubt about a member, and what each means
 DOUBTS = {
     "unconverged": "steps met the limit of work before the tolerance",
+    "unbounded": "the load of the body has no bound in some steps of its window: its means and peaks are lower bounds",
     "jammed": "the towed body stood still while the tow asked for motion",
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
                 "solved",
@@ -43,7 +44,7 @@ DOUBTS = {
 }
 
 #: codes of warnings that tell of one of these; what a verdict rests on are reasons, and no warnings of their own
-TOLD = {"unconverged", "stalled", "not_steady", "too_short", "stopped"}
+TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
 
 #: /summary/window_verdict
 STEADY, NOT_STEADY, TOO_SHORT = 0, 1, 2
@@ -237,10 +238,10 @@ class Ensemble:
         return (label or name.replace("_", " "), *rest)
 
     def series(self, m, name="ice_resistance"):
-        """(time s, values) of a series over a member's whole run."""
+        """(time s, values) of a series over a member's whole run; of steps without a load by bergtow_read.least."""
         time, x = (self._series[key][m] for key in ("time", name))
         there = np.isfinite(time)
-        return time[there], x[there]
+        return time[there], least(x[there])
 
     def steady(self, m):
         """Ice resistance over the window of a member's tow, N; empty where there is none."""
@@ -304,7 +305,9 @@ class Ensemble:
             short = verdict == TOO_SHORT or (np.isnan(verdict) and not independent >= MIN_INDEPENDENT)
             few = self.number("window_n_contact_stretches", m) < MIN_STRETCHES
             checks = {
-                "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
+                "unconverged": self.number("unconverged_steps", m) > 0,
+                "unbounded": self.number("window_no_load_share", m) > 0,
+                "jammed": self.number("stalled_windows", m) > 0,
                 "unsteady": verdict == NOT_STEADY, "short": short and not few, "few": few,
                 "stopped": "stopped" in codes, "other": bool(codes - TOLD)
             }

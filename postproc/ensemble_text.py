@@ -7,8 +7,8 @@ import loads_text
 from ensemble_read import listed
 from text_table import FAR, number, pair, scale, table
 
-DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "few": "F", "stopped": "X",
-                 "other": "O"}
+DOUBT_LETTERS = {"unconverged": "U", "unbounded": "B", "jammed": "J", "unsteady": "N", "short": "S", "few": "F",
+                 "stopped": "X", "other": "O"}
 
 
 def doubts(c):
@@ -60,8 +60,9 @@ def means(s, markdown):
         "of the fields at each end (from 8 fields on). "
         "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
         "its slowest cosine waves. "
-        "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body "
-        "stood still, N window not steady, S short window, F met little ice, X stopped early, O other warning."
+        "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps "
+        "without a solution, so that its mean and peaks are at least these, J body stood still, N window not steady, "
+        "S short window, F met little ice, X stopped early, O other warning."
     )
     drifting = [
         f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"

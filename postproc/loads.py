@@ -26,7 +26,7 @@ import numpy as np
 import stat_alike
 import stat_extreme
 import stat_load
-from bergtow_read import Run, RunError
+from bergtow_read import Run, RunError, least
 from text_table import quantity
 
 TIME_SCALE = 30.0     # s, full scale
@@ -62,6 +62,7 @@ def _floe_force(run):
     if not (np.isfinite(push).any() and np.isfinite(peak).any()):
         return None
     conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
+    push = least(push)
     return Load("floe_force", "force of one floe", run.units("largest_push"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
@@ -83,7 +84,7 @@ def of_run(run):
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
             out.append((Load(name, run.label(name), run.units(name), run.description(name),
-                             run.attribute(name, "needs")), run[name]))
+                             run.attribute(name, "needs")), least(run[name])))
     return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
 
 
@@ -115,9 +116,11 @@ def tows_with(e, rows, *kinds):
 
 
 def cut_off(e, rows, load):
-    """Why a load has no tail where lines parted, "" where none did that matters to it. Tows that are excluded count:
-    those that are left are the ones that the line survived."""
+    """Why a load has no tail, "" where it may have one: steps without a solution, or lines that parted where that
+    matters to it. Tows that are excluded count: those that are left are the ones that the line survived."""
     through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
+    if n := sum(e.number("window_no_load_share", m) > 0 for m in tows):
+        return f"the load of the body has no bound in some steps of {n} of {len(tows)} tows"
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
     return f"the line parted in {n} of {len(tows)} tows" if n else ""
 

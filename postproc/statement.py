@@ -29,6 +29,7 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (ensemble_read.DOUBTS) that concern the value
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
+    "unbounded": "members whose load has no bound in some steps, so that theirs are lower bounds",
     "unsteady": "members whose window is not steady",
     "short": "members with fewer than 20 independent samples",
     "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",

@@ -110,7 +110,8 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s,", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
-    printf("    step means        %s95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", w->at_least ? "at least: " : "", bt_force_text(a, s->p95),
+    printf("    step means        %s95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n",
+           w->at_least ? "at least: " : "", bt_force_text(a, s->p95),
            bt_force_text(b, s->p99), bt_force_text(d, s->peak));
     if (w->series[BT_REPORTED_ICE].start_peak > s->peak)
         printf("      start           the largest, %s, lies before the window\n",

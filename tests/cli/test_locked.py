@@ -19,6 +19,7 @@ TOWED = {
     "body": {"shape": "rectangle", "length": 1, "width": 3, "x": 2, "draft": 0.5, "friction": 0},
     "tow": {"speed": 0.1, "ramp": 0},
     "output": {"window_start": 0},
+    "guard": {"no_solution": 0},
     "solver": {"tolerance": 1e-6, "max_sweeps": 2},  # too little for any of these
 }
 

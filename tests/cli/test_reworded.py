@@ -181,6 +181,7 @@ def test_every_doubt_follows_from_numbers_and_codes(tmp_path):
             ({"window": {"verdict": "too short"}}, "too_short", {"short"}),
             ({"window": {"verdict": "steady", "n_contact_stretches": 3.0}}, None, {"few"}),
             ({"window": {"verdict": "steady"}, "summary": {"unconverged_steps": 4}}, "unconverged", {"unconverged"}),
+            ({"window": {"verdict": "steady", "no_load_share": 0.1}}, "locked", {"unbounded"}),
             ({"window": {"verdict": "steady"}, "summary": {"stalled_windows": 4}}, "stalled", {"jammed"}),
             ({"window": {"verdict": "steady"}}, "stopped", {"stopped"}),
             ({"window": {"verdict": "steady"}}, "overlap", {"other"})]

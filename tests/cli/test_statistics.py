@@ -148,8 +148,8 @@ def test_means_and_intervals_of_known_fields(plain):
 def test_doubts_failures_and_gaps_are_counted(plain):
     folder, result, s = plain
     first, second, third = (c["members"] for c in s["conditions"][:3])
-    assert first["doubts"] == {"unconverged": 2, "jammed": 1, "unsteady": 0, "short": 0, "few": 0, "stopped": 0,
-                               "other": 0} and first["doubtful"] == 3 and first["used"] == 8
+    assert first["doubts"] == {"unconverged": 2, "unbounded": 0, "jammed": 1, "unsteady": 0, "short": 0, "few": 0,
+                               "stopped": 0, "other": 0} and first["doubtful"] == 3 and first["used"] == 8
     assert second["failed"] == 1 and second["waiting"] == 1 and second["used"] == 6 and not s["complete"]
     assert third["doubts"]["short"] == 1 and third["doubts"]["other"] == 1 and third["doubtful"] == 1
     assert s["failed"] == {"c002-r001": "base.yml: too short"}
