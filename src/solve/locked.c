@@ -164,8 +164,8 @@ static void keep_above(bt_world *w, bt_islands *s, double speed)
         if (!(s->share[i] > speed * bt_sum_value(&s->sum[i]))) s->share[i] = 0;
 }
 
-/// Strike out islands whose loads close by no more than the tolerance, or are not those that the sweeps have come to.
-static void keep_grown(bt_world *w, bt_islands *s, const loads *l)
+/// Strike out islands that close by no more than the tolerance.
+static void keep_closing(bt_world *w, bt_islands *s, const loads *l)
 {
     bt_islands_clear(w, s);
     for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
@@ -174,6 +174,11 @@ static void keep_grown(bt_world *w, bt_islands *s, const loads *l)
     }
     bt_islands_add(w, s);
     keep_above(w, s, w->par.tolerance);
+}
+
+/// Strike out islands whose loads are not those that the sweeps have come to.
+static void keep_near(bt_world *w, bt_islands *s, const loads *l)
+{
     bt_islands_clear(w, s);
     for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
         const bt_contact *u = &l->contact[i].u;
@@ -186,12 +191,12 @@ static void keep_grown(bt_world *w, bt_islands *s, const loads *l)
 }
 
 /// A of the islands in which A/P is beyond what gives way into share, 0 for all others.
-static void mark(bt_world *w, bt_islands *s, const loads *l)
+static void mark(bt_world *w, bt_islands *s, const loads *l, double speeds)
 {
     form_change(w, l);
     approach(w, s, l);
     imbalance(w, s);
-    keep_above(w, s, BT_LOCKED_SPEEDS * l->closing);
+    keep_above(w, s, speeds * l->closing);
 }
 
 /// Is an island marked, and one that presses on the towed body?
@@ -210,12 +215,29 @@ static bt_lock marked(const bt_world *w, bt_islands *s, const loads *l)
 }
 
 /// Friction of the contacts that stick, or of none, is in the proof.
-static void take_friction(const bt_world *w, const loads *l, bool sticking)
+static void take_friction(const bt_world *w, const loads *l, bool held)
 {
     for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
         bt_contact *u = &l->contact[i].u;
-        if (!sticking || fabs(u->lt) > BT_LOCKED_STICKS * u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;
+        u->mu *= BT_LOCKED_STICKS;
+        if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;
     }
+}
+
+/// The proof by loads that are balanced first, of normals alone or with the friction that holds.
+static bt_lock by_balance(bt_world *w, bt_islands *s, const loads *found, bool held)
+{
+    const size_t n = (size_t)found->first[w->cells->n];
+    loads l = *found;
+    l.contact = bt_alloc(n + 1, sizeof *l.contact);
+    memcpy(l.contact, found->contact, n * sizeof *l.contact);
+    take_friction(w, &l, held);
+    balance(w, &l);
+    mark(w, s, &l, held ? BT_LOCKED_HELD_SPEEDS : BT_LOCKED_SPEEDS);
+    keep_closing(w, s, &l);
+    if (held) keep_near(w, s, &l);
+    free(l.contact);
+    return marked(w, s, found);
 }
 
 bt_lock bt_locked(bt_world *w)
@@ -224,21 +246,11 @@ bt_lock bt_locked(bt_world *w)
     const loads l = collect(w);
     bt_solver_make_shift(w);
     bt_islands_make(w, s, is_hard);
-    const size_t n = (size_t)l.first[w->cells->n];
-    hard *as_found = bt_alloc(n + 1, sizeof *as_found);
-    memcpy(as_found, l.contact, n * sizeof *as_found);
-    take_friction(w, &l, false);
-    mark(w, s, &l);
-    bt_lock lock = marked(w, s, &l);
-    if (!lock.towed) {
-        memcpy(l.contact, as_found, n * sizeof *as_found);
-        take_friction(w, &l, true);
-        balance(w, &l);
-        mark(w, s, &l);
-        keep_grown(w, s, &l);
-        const bt_lock held = marked(w, s, &l);
-        lock = (bt_lock){lock.found || held.found, held.towed};
+    bt_lock lock = {0};
+    for (int held = 0; held < 2 && !lock.towed; held++) {
+        const bt_lock more = by_balance(w, s, &l, held);
+        lock = (bt_lock){lock.found || more.found, more.towed};
     }
-    free(l.contact), free(l.first), free(as_found);
+    free(l.contact), free(l.first);
     return lock;
 }

@@ -28,8 +28,11 @@
 
 /// Factor on the largest closing speed without loads: bodies that part faster than this are not physical, assumed.
 #define BT_LOCKED_SPEEDS 10
-/// Of the friction bound: a contact that bears less sticks, assumed.
-#define BT_LOCKED_STICKS 0.99
+/// The same of loads that were balanced with friction: far beyond 1/(1 − BT_LOCKED_STICKS), so that what is just above
+/// its angle of friction, with loads however large, never passes for what is below.
+#define BT_LOCKED_HELD_SPEEDS 1e3
+/// Of the friction bound: a contact that bears less sticks, assumed. The loads of the proof stay within it.
+#define BT_LOCKED_STICKS 0.95
 /// Of the normal impulses: by so much may balanced loads differ from those that the sweeps have come to, assumed.
 #define BT_LOCKED_OTHER 0.1
 /// Sweeps that balance the loads at most, and the change of speed, over the closing speed, that ends them.
