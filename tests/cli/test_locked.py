@@ -2,14 +2,24 @@
 """Bodies that cannot give way: told apart from jams that only want more work.
 
 Each scene has so little work that its steps do not converge; the answer is known from the geometry alone. Red when
-bodies that have a way out are called locked, a lock is not found (also across ranks), what rafts counts as hard, or the
-summary advises more sweeps against a lock.
+bodies that have a way out are called locked, a lock is not found (also across ranks), what rafts counts as hard, the
+summary advises more sweeps against a lock, or prints its loads as numbers.
 """
+import sys
+from types import SimpleNamespace
+
+import h5py
 import numpy as np
 import pytest
+import scipy.optimize
+import scipy.sparse
 
-from harness import NUMERIC, Run, changed, run, warned
+from harness import NUMERIC, ROOT, Run, area, changed, differing, quick, run, warned, write_case
 from resuming import done
+
+sys.path.insert(0, str(ROOT / "postproc"))
+import bergtow_read  # noqa: E402
+import loads  # noqa: E402
 
 A = 1.0
 TOWED = {
@@ -100,3 +110,193 @@ def test_a_guard_says_that_it_is_a_lock(tmp_path):
     case = changed(SCENES["a row at the wall"][0], guard__unconverged=5)
     r = run(tmp_path, case, code=NUMERIC)
     assert "locked between others" in r.result.stderr
+
+
+def test_a_share_of_steps_without_a_solution_ends_the_run(tmp_path):
+    case = changed(SCENES["a row at the wall"][0], guard__no_solution=0.3)
+    r = run(tmp_path, case, code=NUMERIC)
+    assert "steps have no solution" in r.result.stderr and "guard.no_solution allows 3" in r.result.stderr
+    lost = r.series("no_load")  # up to the step before the fourth
+    assert lost.sum() == 3 and lost[-1] == 1
+
+
+# ---- wedges
+
+MU = 0.35
+ANGLE_OF_FRICTION = np.arctan(MU)
+GAP = 1e-4
+
+
+def centred(vertices):
+    v = np.array(vertices, float)
+    x, y = v.T
+    c = x * np.roll(y, -1) - np.roll(x, -1) * y
+    middle = np.array([((x + np.roll(x, -1)) * c).sum(), ((y + np.roll(y, -1)) * c).sum()]) / (6 * area(v))
+    return (v - middle).tolist(), middle
+
+
+def wedge(half, thickness=1.0, **more):
+    """A floe of half angle `half`, wide ahead, between a body that comes down on it and a fixed floe."""
+    t = np.tan(half)
+    body, at_body = centred([[-2, -2 * t], [2, 2 * t], [2, 3], [-2, 3]])
+    below, at_below = centred([[-2, 2 * t], [-2, -3], [2, -3], [2, -2 * t]])
+    floe, at_floe = centred([[-1, t - 1], [1, -1 - t], [1, 1 + t], [-1, 1 - t]])
+    up = 1 + GAP
+    return changed({
+        "run": {"dt": 0.1, "duration": 1},
+        "domain": {"length": 20, "width": 20, "sides": "open", "ends": "open"},
+        "ice": {"concentration": 0, "friction": MU},
+        "body": {"shape": "polygon", "vertices": body, "x": 10 + at_body[0], "y": at_body[1] + up, "draft": 0.5,
+                 "friction": MU},
+        "tow": {"speed": 0.1, "ramp": 0, "direction": -90},
+        "floes": [{"shape": "polygon", "vertices": floe, "x": 10 + at_floe[0], "y": at_floe[1],
+                   "thickness": thickness},
+                  {"shape": "polygon", "vertices": below, "x": 10 + at_below[0], "y": at_below[1] - up,
+                   "thickness": 1, "fixed": True}],
+        "output": {"window_start": 0}, "guard": {"overlap": 0, "no_solution": 0}}, **more)
+
+
+def first_load(half, speed=0.1, dt=0.1):
+    """On the body in the first step over the mass of the wedge, both faces sliding: ux, uy the velocity of the wedge,
+    p and q the impulses at the body and at the fixed floe."""
+    gap, c, s = GAP * np.cos(half), np.cos(half), np.sin(half)
+    ux = (speed * c - 2 * gap / dt) / (2 * s)
+    total, difference = ux / (s - MU * c), speed / (2 * (c + MU * s))
+    return 0.5 * (total + difference) * (c + MU * s) / dt
+
+
+@pytest.mark.parametrize("half", [0.05, 0.17, 0.3])
+def test_a_wedge_below_its_angle_of_friction_has_no_load(tmp_path, half):
+    """Velocities that part it exist, and friction forbids them. Red when the proof is without friction, or the sweeps'
+    load is printed."""
+    r = run(tmp_path, wedge(half))
+    lost, ice, tow, drag = r.series("no_load", "ice_resistance", "tow_force", "drag_force")
+    assert lost.sum() == r.summary["no_load_steps"] >= 9 and np.array_equal(np.isnan(ice), lost == 1)
+    assert np.array_equal(np.isnan(tow), lost == 1) and np.isfinite(drag).all()
+    window = r.summary["window"]
+    assert window["at_least"] and window["no_load_share"] == pytest.approx(lost.mean())
+    assert window["verdict"] == "not steady" and "no_load" in [reason["code"] for reason in window["reasons"]]
+    assert "ice resistance    at least " in r.result.stdout and r.summary["peak_ice_resistance_n"] < 1e5
+    assert len(warned(r, "locked between others")) == 1
+
+
+@pytest.mark.parametrize("above, thickness, least", [(1e-2, 1, 1e5), (1e-3, 1, 1e6), (1e-4, 40, 1e9)])
+def test_a_wedge_above_it_has_a_load_however_large(tmp_path, above, thickness, least):
+    """Against its closed form, whose mass comes from a wedge far above. Red when loads that are large pass for none."""
+    r, easy = (run(tmp_path, wedge(ANGLE_OF_FRICTION + a, thickness=thickness, run__duration=0.1), name=name)
+               for a, name in ((above, "out"), (0.02, "easy")))
+    assert r.summary["unconverged_steps"] == easy.summary["unconverged_steps"] == 0
+    load, base = r.series("ice_resistance")[0], easy.series("ice_resistance")[0]
+    wanted = base * first_load(ANGLE_OF_FRICTION + above) / first_load(ANGLE_OF_FRICTION + 0.02)
+    assert load > least and load == pytest.approx(wanted, rel=0.02)
+
+
+@pytest.mark.parametrize("above, sweeps", [(0.1, 1), (1e-3, 1), (1e-3, 20), (1e-4, 5), (1e-5, 3), (1e-5, 100),
+                                           (1e-6, 500)])
+def test_a_wedge_above_it_is_not_locked_when_work_is_short(tmp_path, above, sweeps):
+    r = run(tmp_path, wedge(ANGLE_OF_FRICTION + above, thickness=3, solver={"max_sweeps": sweeps}, run__duration=0.5))
+    assert r.summary["locked_steps"] == 0
+    assert above > 1e-2 or r.summary["unconverged_steps"] > 0
+
+
+def test_a_line_pulls_as_hard_as_it_does(tmp_path):
+    """A body on a stiff line presses a floe against fixed ice with up to 1e9 N: stiffness times what the end has gone
+    on since."""
+    block = changed(row(1, 13.0)[0], width=6, fixed=True)
+    case = changed(towards(1), tow={"mode": "line", "speed": 0.1, "ramp": 0, "line_length": 5, "line_stiffness": 2e9},
+                   body__length=1, body__x=12 - A - 0.501, floes=[changed(row(1)[0], width=4), block], solver=None,
+                   run__duration=6, guard={"energy": 0}, domain__length=40)
+    r = run(tmp_path, case)
+    time, ice, tension, lost = r.series("time", "ice_resistance", "line_tension", "no_load")
+    assert tension[-1] > 1e9 and lost.sum() == 0 and np.isfinite(ice).all()
+    assert ice[-1] == pytest.approx(tension[-1], rel=1e-3)
+    assert tension[-1] - tension[-11] == pytest.approx(2e9 * 0.1 * (time[-1] - time[-11]), rel=0.01)
+
+
+# ---- jams
+
+def jam(seed, concentration, friction=MU, **more):
+    return changed({
+        "run": {"dt": 0.1, "duration": 2.4}, "domain": {"length": 12, "width": 6},
+        "ice": {"concentration": concentration, "size": 1, "friction": friction, "seed": seed, "thickness": 0.3},
+        "body": {"shape": "rectangle", "length": 3, "width": 3, "x": 3, "draft": 1, "friction": friction},
+        "tow": {"speed": 0.3, "ramp": 0}, "output": {"window_start": 0}, "solver": {"max_sweeps": 30},
+        "guard": {"overlap": 0, "no_solution": 0, "escape": False}}, **more)
+
+
+@pytest.mark.parametrize("seed", quick(range(200), 0, 1, 2, 3, 4, 5))
+def test_a_jam_with_room_is_never_locked(tmp_path, seed):
+    """Where nothing but the body is led, all bodies may go along with it: there is a solution. The work is too little
+    for most steps."""
+    r = run(tmp_path, jam(seed, 0.9, [0.1, 0.35, 0.8][seed % 3], domain__ends="open", domain__sides="open",
+                          domain__wall_friction=None, solver__max_sweeps=[1, 2, 3][seed % 3]))
+    assert r.summary["locked_steps"] == 0 and r.summary["unconverged_steps"] > 0
+
+
+def self_stress(path):
+    """Least work of the led bodies on loads that balance each other within the friction cones and sum to 1, an
+    independent linear programme over the dumped problem: below 0, no velocities part every contact by friction times
+    its slip."""
+    with h5py.File(path) as h:
+        g = h["fclib_local"]
+        m = int(g["W/m"][0])
+        w = scipy.sparse.csr_matrix((g["W/x"][:], g["W/i"][:], g["W/p"][:]), (m, m))
+        q, mu = g["vectors/q"][:], g["vectors/mu"][:]
+    scale = scipy.sparse.diags(1 / np.sqrt(w.diagonal()))
+    size, n = scale.diagonal(), m // 2
+    normal, tangent = np.arange(0, m, 2), np.arange(1, m, 2)
+    rows = np.tile(np.arange(n), 2)
+    cone = scipy.sparse.vstack([
+        scipy.sparse.csr_matrix((np.r_[sign * size[tangent], -mu * size[normal]], (rows, np.r_[tangent, normal])),
+                                (n, m)) for sign in (1, -1)])
+    total = scipy.sparse.csr_matrix((size[normal] / size[normal].mean(), (np.zeros(n, int), normal)), (1, m))
+    found = scipy.optimize.linprog(size * q / np.abs(size * q).max(), A_ub=cone, b_ub=np.zeros(2 * n),
+                                   A_eq=scipy.sparse.vstack([scale @ w @ scale, total]), b_eq=np.r_[np.zeros(m), 1.0],
+                                   bounds=[(0, None), (None, None)] * n, method="highs")
+    return found.fun if found.status == 0 else np.inf
+
+
+@pytest.mark.parametrize("friction", [0, MU])
+def test_a_closed_box_locks(tmp_path, friction):
+    """A body that is led through a full box with walls. Each step that is called locked has a self-stress against which
+    the led body works."""
+    case = jam(1, 0.9, friction)
+    r = run(tmp_path, case)
+    lost = np.flatnonzero(r.series("no_load"))
+    assert len(lost) > 3 and lost[0] > 5
+    dump = tmp_path / "problem.h5"
+    run(tmp_path, changed(case, run__duration=round(0.1 * (lost[0] + 1), 3)), "--dump-contacts",
+        f"{lost[0] + 1}:{dump}", name="short")
+    assert self_stress(dump) < -1e-5
+
+
+def test_locks_are_the_same_on_ranks_and_after_a_resume(tmp_path):
+    """Red when loads without a number are refused in a checkpoint, or ranks prove different things."""
+    write_case(tmp_path, jam(1, 0.9, output={"window_start": 0, "panels": True, "sample_every": 2}))
+    done(1, "run", tmp_path / "case.yml", "-o", tmp_path / "whole", "--quiet")
+    whole = Run(tmp_path / "whole", None)
+    assert whole.summary["no_load_steps"] > 3
+    done(2, "run", tmp_path / "case.yml", "-o", tmp_path / "many", "--quiet")
+    done(1, "run", tmp_path / "case.yml", "-o", tmp_path / "part", "--steps", 15, "--quiet")
+    done(2, "resume", tmp_path / "part", "--quiet")
+    for name in ("many", "part"):
+        other = Run(tmp_path / name, None)
+        assert other.hash == whole.hash and other.summary["no_load_steps"] == whole.summary["no_load_steps"]
+        assert other.summary["window"] == whole.summary["window"]
+        assert not [n for n in differing(tmp_path / "whole/result.h5", tmp_path / name / "result.h5") if "series" in n]
+
+
+# ---- readers
+
+def test_a_load_that_is_no_number_counts_as_the_last_one():
+    x = np.array([np.nan, 1, np.nan, np.nan, 3])
+    assert np.array_equal(bergtow_read.least(x), [0, 1, 1, 1, 3])
+    assert np.isnan(bergtow_read.least(np.full(3, np.nan))).all()
+
+
+def test_a_tow_without_a_load_has_no_tail():
+    share = [0.0, 0.2, np.nan]
+    e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [])
+    load = SimpleNamespace(name="ice_resistance", needs="")
+    assert "no bound in some steps of 1 of 3 tows" in loads.cut_off(e, [0, 1, 2], load)
+    assert loads.cut_off(e, [0, 2], load) == ""
