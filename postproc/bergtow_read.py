@@ -416,7 +416,10 @@ class Run:
     @property
     def mean_name(self):
         """How a mean of it may be called."""
-        return "mean" if self.verdict[0] == "steady" else "mean over the window"
+        found = "mean" if self.verdict[0] == "steady" else "mean over the window"
+        share = 100 * self.number("window.no_load_share")
+        return f"{found}, at least (in {share:.2g} % of its steps the load has no bound)" \
+            if self.at_least else found
 
     def interval(self, key):
         """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;

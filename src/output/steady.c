@@ -185,6 +185,11 @@ static void reduce(bt_steady *s, const bt_history *h, const bt_run_totals *t)
         s->no_load += (h->column[BT_COL_NO_LOAD][i] > 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
     }
+    s->at_least = s->no_load > 0;
+    if (!s->at_least) return; // a lower bound has no interval; the tow force is none on a line
+    ice->se = ice->low = ice->high = NAN;
+    bt_mean *tow = &s->series[BT_REPORTED_TOW].mean;
+    if (isnan(s->series[BT_REPORTED_TENSION_1].peak)) tow->se = tow->low = tow->high = NAN;
 }
 
 double bt_steady_peak_tension(const bt_steady *s, bool before)
@@ -209,7 +214,6 @@ void bt_steady_none(bt_steady *s)
 static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
     const double speed = t->tolerance / c->solver.tolerance;
-    s->at_least = s->no_load > 0;
     if (s->at_least)
         bt_warn(because(s, BT_NOT_STEADY), BT_WARN_NO_LOAD,
                 "%.3g %% of the steps in the window have no solution that bounds the load of the body, so its means, "

@@ -17,10 +17,28 @@
 //
 // with |U' − U| the larger of the change of speed and r times that of the spin, r the radius of the body. Where A/P is
 // far beyond any speed of the step, nothing can give way but in ways no ice takes. With P = 0 this is the lemma of
-// Farkas. Rigid floes that are held by friction alone are not found. They have a solution, however large, where some
-// velocities part every contact by μ times their slip at least (Acary, Cadoux, Lemaréchal & Malick 2011). Where none
-// do, there may be none, as of a wedge below its angle of friction between bodies that are led: that counts as a step
-// that did not converge.
+// Farkas. The λ that the sweeps have come to are balanced first: sweeps of the same problem with all that drives it at
+// rest (U* = 0, b = 0) end at loads with Jᵀλ = 0, or at none.
+//
+// Friction. A wedge below its angle of friction between bodies that are led has velocities that part it, and still no
+// load: sliding out at the speed u on two faces of half angle α takes M u = λ (sin α − μ cos α), and λ < 0 for
+// tan α < μ. There the proof takes the friction of contacts that stick, those that the sweeps hold within
+// BT_LOCKED_STICKS of their cones, w = 0 at a solution that holds them so, too, and of all others the normal impulse
+// alone, λ_n w_n >= 0:
+//
+//     0 ≤ Σ over sticking λ·w' + Σ over others λ_n w_n' = λ·w + (Jᵀλ)·(U' − U),    so again    |U' − U| ≥ A/P.
+//
+// So no solution holds these contacts as these loads do, at any load. That says nothing of a solution whose contacts
+// slide where these stick: Coulomb's law may have one far from here. A step counts only where the balanced loads
+// are those that the sweeps have come to, within BT_LOCKED_OTHER of their sum: what the sweeps would print is then near
+// none. Velocities that part every contact by μ times their slip at least would be enough for a solution (Acary,
+// Cadoux, Lemaréchal & Malick 2011). That none do was rejected as the proof: in dense boxes steps converge to loads of
+// kilonewtons where a linear programme finds none.
+//
+// A load that is finite, however large, is not taken for a lock: a wedge above its angle of friction slides on both
+// faces, at the rim of its cones, and loads within BT_LOCKED_STICKS of them leave it P ≥ 2 λ sin(α − α_s) with
+// tan α_s = BT_LOCKED_STICKS μ, so A/P is some closing speeds over (1 − BT_LOCKED_STICKS) μ. A wedge between α_s and
+// its angle of friction is not recognised, and counts as a step that did not converge.
 #ifndef BERGTOW_LOCKED_H
 #define BERGTOW_LOCKED_H
 
@@ -28,10 +46,9 @@
 
 /// Factor on the largest closing speed without loads: bodies that part faster than this are not physical, assumed.
 #define BT_LOCKED_SPEEDS 10
-/// The same of loads that were balanced with friction: far beyond 1/(1 − BT_LOCKED_STICKS), so that what is just above
-/// its angle of friction, with loads however large, never passes for what is below.
+/// The same where friction takes part: well above 1/((1 − BT_LOCKED_STICKS) μ), assumed.
 #define BT_LOCKED_HELD_SPEEDS 1e3
-/// Of the friction bound: a contact that bears less sticks, assumed. The loads of the proof stay within it.
+/// Share of the friction bound below which a contact sticks; the loads of the proof stay within it, assumed.
 #define BT_LOCKED_STICKS 0.95
 /// Of the normal impulses: by so much may balanced loads differ from those that the sweeps have come to, assumed.
 #define BT_LOCKED_OTHER 0.1
