@@ -206,13 +206,22 @@ MUTANTS = {
         ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
         ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
     ]),
-    "src/solve/locked.c": (["cli/test_locked.py::test_bodies_that_cannot_give_way"], [
+    "src/solve/locked.c": (["cli/test_locked.py::test_bodies_that_cannot_give_way",
+                            "cli/test_locked.py::test_a_wedge_below_its_angle_of_friction_has_no_load",
+                            "cli/test_locked.py::test_a_wedge_above_it_is_not_locked_when_work_is_short",
+                            "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
          "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
         ("power -= u->ln[c]", "power += u->ln[c]", "parting counts as approach"),
         ("bt_hypot(d->x, d->y) / b->inv[i].m + moment", "0", "what can give way is locked, too"),
-        ("BT_LOCKED_SPEEDS * t.most * bt_sum_value", "1e30 * t.most * bt_sum_value", "nothing is ever locked"),
-        ("bt_phases_run(w, push, NULL, w->solver->shift, &t);", "", "no load, no imbalance"),
+        ("if (!(s->share[i] > speed * bt_sum_value(&s->sum[i]))) s->share[i] = 0;", "s->share[i] = 0;",
+         "nothing is ever locked"),
+        ("held < 2 && !lock.towed", "held < 1 && !lock.towed", "friction holds nothing"),
+        ("        u->mu *= BT_LOCKED_STICKS;\n", "", "loads of the proof go to the rim of their cones"),
+        ("if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;",
+         "if (!held) u->mu = 0, u->lt = 0;", "what slides is taken for held"),
+        ("    if (held) keep_near(w, s, &l);\n", "", "loads that the sweeps have not come to"),
+        ("    keep_closing(w, s, &l);\n", "", "what closes below the tolerance"),
     ]),
     "src/solve/project.c": (PROJECT, [
         ("g->gap[i] += w->par.dt * ", "if (w->par.dt < 0) g->gap[i] += w->par.dt * ", "overlap of the start"),
