@@ -205,7 +205,8 @@ def test_a_line_pulls_as_hard_as_it_does(tmp_path):
     block = changed(row(1, 13.0)[0], width=6, fixed=True)
     case = changed(towards(1), tow={"mode": "line", "speed": 0.1, "ramp": 0, "line_length": 5, "line_stiffness": 2e9},
                    body__length=3, body__draft=20, body__x=12 - A - 1.501, floes=[changed(row(1)[0], width=4), block],
-                   solver=None, run__duration=30, guard={"energy": 0}, domain__length=40)
+                   solver=None, run__duration=30, guard={"energy": 0}, domain__length=40,
+                   ice__friction=MU, body__friction=MU)  # without it the line pulls the body aside in the end
     r = run(tmp_path, case)
     time, ice, tension, lost = r.series("time", "ice_resistance", "line_tension", "no_load")
     assert tension[-1] > 1e9 and lost.sum() == 0 and np.isfinite(ice).all()
