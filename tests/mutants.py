@@ -218,10 +218,6 @@ MUTANTS = {
          "nothing is ever locked"),
         ("held < 2 && !lock.towed", "held < 1 && !lock.towed", "friction holds nothing"),
         ("        u->mu *= BT_LOCKED_STICKS;\n", "", "loads of the proof go to the rim of their cones"),
-        ("if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;",
-         "if (!held) u->mu = 0, u->lt = 0;", "what slides is taken for held"),
-        ("    if (held) keep_near(w, s, &l);\n", "", "loads that the sweeps have not come to"),
-        ("    keep_closing(w, s, &l);\n", "", "what closes below the tolerance"),
     ]),
     "src/solve/project.c": (PROJECT, [
         ("g->gap[i] += w->par.dt * ", "if (w->par.dt < 0) g->gap[i] += w->par.dt * ", "overlap of the start"),

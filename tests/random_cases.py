@@ -84,6 +84,7 @@ FREE = {
     "guard.overlap": (0.5, 100, "m"),
     "guard.energy": (1e3, 1e12, "m"),
     "guard.unconverged": (100, 1e9, "m"),
+    "guard.no_solution": (0.01, 1, "lm"),
     "guard.escape": [True],
     "impact.conversion": None,
     "impact.corner": None,

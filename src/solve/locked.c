@@ -124,7 +124,7 @@ static void balance(bt_world *w, const loads *l)
 }
 
 /// A of each island into share.
-static void approach(bt_world *w, bt_islands *s, const loads *l)
+static void power_of_closing(bt_world *w, bt_islands *s, const loads *l)
 {
     const bt_vel *v = w->bodies.vel;
     bt_islands_clear(w, s);
@@ -194,7 +194,7 @@ static void keep_near(bt_world *w, bt_islands *s, const loads *l)
 static void mark(bt_world *w, bt_islands *s, const loads *l, double speeds)
 {
     form_change(w, l);
-    approach(w, s, l);
+    power_of_closing(w, s, l);
     imbalance(w, s);
     keep_above(w, s, speeds * l->closing);
 }
