@@ -204,8 +204,9 @@ typedef struct bt_patch {
     double length, middle; ///< m, m from the centroid of a along the tangent; NaN where they do not overlap
 } bt_patch;
 
-/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent.
-bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way);
+/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent; *area: of the
+/// overlap, m².
+bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way, double *area);
 
 /// Share of a patch that falls to point i of the manifold, of those that take part: uniform pressure on it, as forces
 /// at the points. NaN: to each alike.

@@ -91,12 +91,11 @@ static void stop_at_constant_force(void **state)
         energy += w->stats.contact_work;
         if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
     }
-    CHECK_CLOSE(stopped, gap / v + v / brake, 2 * dt);
+    CHECK_CLOSE(stopped, gap / v + v / brake, 8 * dt); // what is left of its speed is squared from step to step
     CHECK_CLOSE(pose(w, 0)->x, scene_law(w, "crushed_depth"), 1e-9);
-    CHECK_CLOSE(scene_law(w, "crushed_depth"), 0.5 * v * v / brake, v * dt);
+    CHECK_CLOSE(scene_law(w, "crushed_depth"), 0.5 * v * v / brake, 1e-9);
     CHECK_CLOSE(energy, -0.5 * sheet * v * v, 1e-9 * sheet * v * v);
-    // all but what the last step took below the limit
-    CHECK_CLOSE(work, 0.5 * sheet * v * v, sheet * brake * brake * dt * dt);
+    CHECK_CLOSE(work, 0.5 * sheet * v * v, 1e-9 * sheet * v * v);
     bt_world_free(w);
 }
 
@@ -336,7 +335,8 @@ static void two_floes(void **state)
     d.motion = BT_STATIC, d.large = true, d.x = 1.5, d.y = 1.25; // reaches down to y = 0.25: a quarter of the edge
     bt_world_add(w, &d);
     bt_world_step(w);
-    CHECK_CLOSE(pushed(w) / dt, pressure * 0.3 * 0.25, 1e-6 * pressure);
+    // by the energy, F Δt 2 u/(v + u): the slab meets two ends of the edge's part at two speeds
+    CHECK_CLOSE(pushed(w) / dt, pressure * 0.3 * 0.25, 0.005 * pressure * 0.3 * 0.25);
     bt_world_free(w);
 }
 
@@ -377,15 +377,79 @@ static void corner(void **state)
             }
             if (j == 0) {
                 CHECK_CLOSE(depth, deep, 0.005 * deep);
-                CHECK_CLOSE(stopped, 0.5 * BT_PI * sqrt(m / k), 2 * dt);
+                CHECK_CLOSE(stopped, 0.5 * BT_PI * sqrt(m / k), 8 * dt);
                 CHECK_CLOSE(work, 0.5 * m * v * v, 0.005 * 0.5 * m * v * v);
             }
             print_message("dt √(k/m) %g: depth %.3f of v √(m/k)\n", steps[j], depth / deep);
-            assert_true(depth > 0.7 * deep && depth < 1.001 * deep);
+            CHECK_CLOSE(depth, deep, 1e-3 * deep);
+            CHECK_CLOSE(work, 0.5 * m * v * v, 1e-3 * m * v * v);
             CHECK_CLOSE(pose(w, 0)->x, depth, 1e-6);
             assert_true(w->stats.overlap <= 1e-9);
             bt_world_free(w);
         }
+    }
+}
+
+/// A floe of 30 m at full scale meets a wall by its face, a corner, a disc's rim, at 0.5 m/s, from a gap to cross
+/// first or none: its depth is the one at which crushing has taken its kinetic energy, and its work that energy.
+static void energy_at_any_time_step(void **state)
+{
+    (void)state;
+    const double p0 = 1.5e6, h = 1, v = 0.5, steps[] = {0.002, 0.01, 0.05, 0.1, 0.2, 0.5, 1, 2, 5},
+                 gaps[] = {0, 0.03, 0.37, 0.9};
+    enum { FACE, CORNER, BLUNT, RIM, SHAPES };
+    const char *name[] = {"face", "corner", "blunt corner", "rim"};
+    for (int shape = 0; shape < SHAPES; shape++) {
+        double o[2 * BT_MAX_VERTICES], worst[2] = {0};
+        const int n = shape == RIM ? 32 : 4;
+        const double radius = 15, half = BT_PI / n;
+        for (int k = 0; k < n; k++) { // a corner at +x, or an edge
+            const double at = 2 * half * k + (shape == FACE || shape == RIM ? half : 0), r = radius / cos(half);
+            o[2 * k] = r * cos(at), o[2 * k + 1] = r * sin(at);
+        }
+        const double tip = shape == CORNER || shape == BLUNT ? radius / cos(half) : radius;
+        const double m = 910 * h * bt_shape_moments(n, o).area, energy = 0.5 * m * v * v, least = shape == BLUNT ? 0.3 : 0;
+        // The depth at which p h ∫ max(l, least) is the energy.
+        double deep = 0, taken = 0;
+        for (const double dd = 1e-6; taken < energy; deep += dd) {
+            double l = 2 * radius;
+            if (shape == CORNER || shape == BLUNT) l = 2 * deep;
+            if (shape == RIM) { // of the polygon
+                double x = radius - deep;
+                for (int k = 0; k < n / 4; k++)
+                    if (o[2 * k] >= x && o[2 * k + 2] <= x)
+                        l = 2 * (o[2 * k + 1] + (o[2 * k] - x) / (o[2 * k] - o[2 * k + 2]) * (o[2 * k + 3] - o[2 * k + 1]));
+            }
+            taken += p0 * h * bt_max(l, least * h) * dd;
+        }
+        for (int j = 0; j < 9; j++)
+            for (int k = 0; k < 4; k++) {
+                const double dt = steps[j];
+                bt_params p = scene_params(dt, 30);
+                p.slop = 0.03;
+                p.rest_speed = 0.005;
+                p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = p0;
+                p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = least;
+                bt_world *w = bt_world_create(&p);
+                bt_body_def d = scene_prism(n, o, 910 * h);
+                d.vx = v, d.thickness = h;
+                bt_world_add(w, &d);
+                const double gap = gaps[k] * v * dt;
+                scene_wall(w, tip + gap, -500, tip + 500, 500, 0);
+                double work = 0, depth = 0;
+                for (int s = 0; s < 4 / dt + 8; s++) {
+                    bt_world_step(w);
+                    assert_true(w->stats.converged);
+                    work += scene_law(w, "crushed_work");
+                    depth = bt_max(depth, scene_law(w, "crushed_depth"));
+                }
+                const double off[2] = {fabs(depth / deep - 1), fabs(work / energy - 1)};
+                for (int i = 0; i < 2; i++) worst[i] = bt_max(worst[i], off[i]);
+                CHECK_CLOSE(pose(w, 0)->x - gap, depth, 1e-6);
+                bt_world_free(w);
+            }
+        print_message("%s: off by %.2g, %.2g\n", name[shape], worst[0], worst[1]);
+        assert_true(worst[0] < 0.005 && worst[1] < 0.005);
     }
 }
 
@@ -404,17 +468,18 @@ static void friction_from_the_limit(void **state)
     d.inertia *= 1e9; // both points are at the limit: nothing else would keep it from turning
     bt_world_add(w, &d);
     scene_wall(w, 0.5, -50, 5, 50, mu);
-    double work = 0, crushed = 0;
+    double work = 0, crushed = 0, friction = 0;
     for (int s = 0; s < 400; s++) {
+        const bt_vel last = *vel(w, 0);
         bt_world_step(w);
         assert_true(w->stats.converged);
         work += w->stats.contact_work;
         crushed += scene_law(w, "crushed_work");
+        friction += mu * sheet * (last.x - vel(w, 0)->x) * 0.5 * (last.y + vel(w, 0)->y);
         if (s * dt < 0.9 * v / brake) {
-            CHECK_CLOSE(slide - vel(w, 0)->y, mu * brake * (s + 1) * dt, 1e-8);
+            CHECK_CLOSE(slide - vel(w, 0)->y, mu * (v - vel(w, 0)->x), 1e-8);
+            CHECK_CLOSE(v - vel(w, 0)->x, brake * (s + 1) * dt, 0.01 * v);
             const double before = 0.5 * sheet * (v * v + slide * slide);
-            // mean of both ends of the steps
-            const double friction = mu * pressure * h * (pose(w, 0)->y + 0.5 * dt * (slide - vel(w, 0)->y));
             CHECK_CLOSE(before - w->stats.kinetic_energy, crushed + friction, 1e-7 * before);
         }
         CHECK_CLOSE(work, w->stats.kinetic_energy - 0.5 * sheet * (v * v + slide * slide), 1e-8 * sheet);
@@ -459,7 +524,8 @@ static void memory(void **state)
         }
         CHECK_CLOSE(free_until, away[i] < 1 ? start : 0, 2 * back * dt);
         assert_true(w->stats.overlap <= 1e-9);
-        if (away[i] < 1) CHECK_CLOSE(pose(w, 0)->x, start, 1e-6); // m v < p h L Δt: the dent bears it
+        const double again = 0.5 * back * back / (pressure * h / sheet); // its energy goes on crushing
+        if (away[i] < 1) CHECK_CLOSE(pose(w, 0)->x, start + again, 1e-6);
     }
     bt_world_free(w);
 }
@@ -513,7 +579,7 @@ static void body_at_a_set_speed(void **state)
     for (int s = 0; s < 20; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);
-        if (s == 0) continue; // the floes are set in motion
+        if (s < 12) continue; // the floes are set in motion
         const bt_cell *t = w->cells->cell;
         for (bt_idx k = 0; k < w->cells->n; k++)
             for (bt_idx j = 0; j < t[k].n_contacts; j++)
@@ -522,7 +588,8 @@ static void body_at_a_set_speed(void **state)
         CHECK_CLOSE(scene_law(w, "crushed_work"), 0.5 * pressure * h * 0.1 * dt, 1e-6 * pressure * h);
     }
     // The thin floe's two sides share what is crushed.
-    CHECK_CLOSE(pose(w, 0)->x, 0.2, 1e-6);
+    // The first floe is hit while others hold it: up to half its share of the limit of that step is crushed, 1/4 + ...
+    assert_true(pose(w, 0)->x > 0.2 - 0.005 && pose(w, 0)->x < 0.2 + 1e-6);
     CHECK_CLOSE(pose(w, 3)->x, 3, 1e-6);
     assert_true(pose(w, 2)->x > 2 - 1e-6 && pose(w, 2)->x < 2.2 + 1e-6);
     bt_world_free(w);
@@ -613,6 +680,7 @@ int main(void)
         cmocka_unit_test(sliding_back_brings_no_overlap),
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
+        cmocka_unit_test(energy_at_any_time_step),
         cmocka_unit_test(friction_from_the_limit),
         cmocka_unit_test(memory),
         cmocka_unit_test(rebound_below_the_limit),
