@@ -167,6 +167,9 @@ bt_key bt_case_keys[] = {
          "form drag of the floe's edge in air; that of icebergs [Hunke & Comeau 2011], assumed for floes"),
     REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]",
          "skin drag of air over a floe [Hunke & Comeau 2011]"),
+    REAL("ice.drag.tangential", ice.drag.tangential, RATIO, "0", "[0, 1]",
+         "share of the flow along a side that counts in the moment of form drag on floes; 0: pressure, as "
+         "body.drag.tangential"),
     CHOICE("ice.start", ice.start, starts, "drift",
            "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, "
            "water, Coriolis and slope at time zero balance, none across walls; rest: 0"),
@@ -242,6 +245,10 @@ bt_key bt_case_keys[] = {
          "form drag over the sail [Hunke & Comeau 2011]"),
     REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]",
          "skin drag of air over the body [Hunke & Comeau 2011]"),
+    REAL("body.drag.tangential", body.drag.tangential, RATIO, "0", "[0, 1]",
+         "share of the flow along a side that counts in the moment of form drag: 0 = pressure, along the normal "
+         "[cross-flow principle: Faltinsen 1990]; 1 = along the local flow, which damps turning two to four times as "
+         "much. The force on a body that does not turn is the same"),
 
     CHOICE("tow.mode", tow.mode, tow_modes, "speed",
            "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on "
