@@ -12,6 +12,7 @@
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
+#define NEAR 0.5 // of the way at which the overlap was looked at: nearer by than this, it is looked at again
 #define MOST_DEPTH 0.3 // of the mean floe size: beyond, outlines that stay as they were are no model
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
@@ -135,9 +136,9 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
-/// Force F(y) of the ice on one point that goes in by y, and its work E(y); lines of the depth, about y = way.
+/// Force F(y) of the ice on one point that goes in by y, two lines, and its work E(y).
 typedef struct {
-    double touch;              ///< F(0), N; held up to `kink`, m
+    double touch, ramp;        ///< F = touch + ramp y up to `kink`, m; N, N/m
     double kink;
     double force, slope, work; ///< beyond it F = force + slope y and E = work + force y + ½ slope y²; N, N/m, J
     double mean;               ///< E(way)/way, N
@@ -145,81 +146,62 @@ typedef struct {
 
 static double work_to(const resistance *r, double y)
 {
-    return y <= r->kink ? r->touch * y : r->work + y * (r->force + 0.5 * r->slope * y);
+    return y <= r->kink ? y * (r->touch + 0.5 * r->ramp * y) : r->work + y * (r->force + 0.5 * r->slope * y);
 }
 
 /// Of lengths at the depths `slop` and `way`, and areas of the overlap there; line: p h.
+///
+/// ∫ l = l(0) y + c y^q has l(0), l(way) and the area right; q = 2 is a corner, 3/2 a disc, 1 an edge that lies flush at
+/// once. Two lines that are l and its slope at both ends have the area right if they meet at (1 − 1/q) way.
 static resistance resistance_of(const double length[2], const double area[2], double least, double line, double slop,
                                 double way)
 {
     const double last = bt_max(length[0], length[1]);
     const double first = bt_max(0, length[0] - (last - length[0]) * slop / (way - slop)), rise = last - first;
+    resistance r = {.touch = line * bt_max(first, least), .kink = INFINITY};
+    r.mean = r.touch;
+    if (!(last > bt_max(first, least))) return r;
     const double before = bt_max(0, area[0] - 0.5 * slop * (first + length[0]));
-    // ∫ l = first y + c y^q has l(0), l(way) and the area right: the line at `way` has its curvature, q <= 2: a corner.
-    const double more = bt_max(0.5, bt_min(1, (area[1] - before - first * way) / (rise * way)));
-    const double slope = rise > 0 ? rise / way * (1 / more - 1) : 0, at = last - slope * way;
-    const double work = rise > 0 ? way * (first + more * rise - at - 0.5 * slope * way) : 0;
-    resistance r = {.touch = line * bt_max(first, least), .force = line * at, .slope = line * slope, .work = line * work};
-    if (first < least) {
-        r.kink = slope > 0 ? bt_max(0, (least - at) / slope) : least < last ? 0 : INFINITY;
-        if (r.kink > 0 && isfinite(r.kink)) r.work = r.kink * (r.touch - r.force - 0.5 * r.slope * r.kink);
-    }
+    const double share = bt_max(0.5, bt_min(1, (area[1] - before - first * way) / (rise * way))); // 1/q
+    const double slope = rise / way * (1 / share - 1), at = last - slope * way;
+    const bool blunt = at < least; // the second line meets the least length
+    r.kink = blunt ? (least - at) / slope : (1 - share) * way;
+    r.force = line * at, r.slope = line * slope;
+    if (!blunt && r.kink > 0) r.ramp = bt_max(0, r.force + r.slope * r.kink - r.touch) / r.kink;
+    r.work = r.kink * (r.touch - r.force + 0.5 * (r.ramp - r.slope) * r.kink);
     r.mean = bt_max(r.touch, work_to(&r, way) / way);
     return r;
 }
 
-/// Approaches of a point in a lone collision and what closes its gap, m/s; load: its share of the impulse that the
-/// external forces give the pair in the step, N s.
-typedef struct { double before, place, load; } hit;
-
-/// Root u of a u² + b u = k, the larger one; −∞ where there is none.
-static double root_of(double a, double b, double k)
+/// Ends of a lone collision, of both points at once, in turns: how far each goes in, m/s, and whether that is a stop.
+static void collide(const bt_mass *m, const bt_hit h[2], const double place[2], const resistance r[2], int n, double dt,
+                    double in[2])
 {
-    const double root = b * b + 4 * a * k;
-    if (!(root >= 0)) return -INFINITY;
-    return b > 0 ? 2 * k / (b + sqrt(root)) : (sqrt(root) - b) / (2 * a);
-}
-
-/// Approach of a point at the end of the step, of a lone collision where the other point takes other/W from it, m/s;
-/// below `place` where it does not come to touch.
-static double end_of(const hit *h, const resistance *r, double w, double other, double dt)
-{
-    const double gap = dt * h->place, b = other - 2 * h->load, k = h->before * (h->before / w - other);
-    const double held = root_of(1 / w, b + 2 * dt * r->touch, k + 2 * gap * r->touch);
-    if (dt * held - gap <= r->kink) return held;
-    return root_of(1 / w + r->slope * dt * dt, b + 2 * dt * (r->force - r->slope * gap),
-                   k - 2 * r->work + gap * (2 * r->force - r->slope * gap));
-}
-
-/// Approaches and impulses at the end of a lone collision: both points at once, in turns.
-static void collide(const bt_mass *m, const hit h[2], const resistance r[2], int n, double dt, double end[2],
-                    double impulse[2])
-{
-    enum { TURNS = 8 };
+    enum { TURNS = 2 };
+    double impulse[2] = {0};
     // Where both are driven in alike the impulses are as the lengths.
     for (int i = 0; i < n; i++) {
         const double all = m->w[i] + (n > 1 && r[i].mean > 0 ? m->w12 * r[1 - i].mean / r[i].mean : 0);
-        const double w = all > 0.1 * m->w[i] ? all : m->w[i];
-        impulse[i] = h[i].load + bt_max(0, (h[i].before - end_of(&h[i], &r[i], w, 0, dt)) / w);
+        const double w = all > 0.1 * m->w[i] ? all : m->w[i], free = h[i].before + w * h[i].load;
+        impulse[i] = bt_max(0, (free - place[i] - bt_hit_end(&h[i], place[i], free, w)) / w);
     }
     for (int turn = 0; turn < (n > 1 ? TURNS : 1); turn++)
         for (int i = 0; i < n; i++) {
-            const double other = n > 1 ? m->w12 * m->mn[i] * (impulse[1 - i] - h[1 - i].load) : 0;
-            const double rigid = h[i].load + (h[i].before - h[i].place) * m->mn[i] - other;
-            end[i] = end_of(&h[i], &r[i], m->w[i], other, dt);
-            impulse[i] = bt_max(0, end[i] > h[i].place ? rigid - (end[i] - h[i].place) * m->mn[i]
-                                                       : bt_min(rigid, dt * r[i].touch));
+            const double other = n > 1 ? m->w12 * (impulse[1 - i] - h[1 - i].load) : 0;
+            const double free = h[i].before + m->w[i] * h[i].load - other;
+            in[i] = h[i].before > place[i] ? bt_hit_end(&h[i], place[i], free, m->w[i]) : 0;
+            impulse[i] = bt_max(0, (free - place[i] - in[i]) * m->mn[i]);
+            if (!(in[i] > 0)) impulse[i] = bt_min(impulse[i], dt * r[i].touch);
         }
 }
 
-/// Velocities of the rows before the step, and the loads: W load = what the free velocities have more.
-static void hits_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, const bt_mass *m, hit h[2])
+/// Approaches before the step, and the loads: W load = what the free velocities have more.
+static void approach_of(const bt_world *w, const bt_contact *u, const bt_mass *m, bt_hit h[2])
 {
     const bt_bodies *s = &w->bodies;
     double gain[2] = {0};
     for (int i = 0; i < u->n; i++) {
         h[i].before = -bt_normal_velocity(u, i, &s->vel_start[u->a], &s->vel_start[u->b]);
-        h[i].place = bt_max(g->gap[i], 0) / w->par.dt;
         gain[i] = -bt_normal_velocity(u, i, &s->vel_free[u->a], &s->vel_free[u->b]) - h[i].before;
     }
     for (int i = 0; i < u->n; i++) {
@@ -228,15 +210,19 @@ static void hits_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, co
     }
 }
 
-/// Work of crushing is the energy lost: the line from no crush to the lone collision.
-static void bound_hit(bt_limit *l, int i, const hit *h, double end, double impulse, double most)
+/// The same of the ice, over a step.
+static void take_resistance(bt_hit *h, const resistance *r, double dt)
 {
-    const double borne = h->load * (h->before - h->place) / (h->before + h->place);
-    const double flat = bt_max(0, bt_min(impulse, borne));
-    l->flat[i] = bt_min(l->flat[i], flat);
-    l->most[i] = bt_min(l->most[i], bt_max(most, impulse));
-    l->rise->base[i] = bt_min(l->flat[i], flat);
-    l->rise->slope[i] = (impulse - flat) / (end - h->place);
+    h->touch = dt * r->touch, h->ramp = dt * dt * r->ramp, h->kink = r->kink / dt;
+    h->force = dt * r->force, h->slope = dt * dt * r->slope, h->work = r->work;
+}
+
+/// Work of crushing is the energy lost. What the loads give is borne without a way.
+static void bound_hit(bt_limit *l, int i, const bt_hit *h, double place, double most)
+{
+    l->flat[i] = bt_min(l->flat[i], bt_max(0, h->load * (h->before - place) / (h->before + place)));
+    l->most[i] = bt_min(l->most[i], most);
+    l->rise->hit[i] = *h;
 }
 
 /// The mean force over the way.
@@ -266,43 +252,44 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     for (int i = 0; i < m->n_points; i++) g->gap[i] += l->rise->depth[i];
     const bt_closing c = bt_law_closing(w, t, j, m);
     const double least = own[BT_CRUSH_LEAST] * h / c.n, least_way = bt_max(LEAST_WAY * w->par.size, 2 * slop);
-    hit hits[2];
-    bool strikes[2] = {false}, any = false;
-    hits_of(w, u, g, &mass, hits);
+    bt_hit hits[2] = {0};
+    double place[2] = {0}, in[2] = {0};
+    bool strikes[2] = {false};
+    approach_of(w, u, &mass, hits);
     for (int i = 0; i < m->n_points; i++) {
+        place[i] = bt_max(g->gap[i], 0) / dt;
         strikes[i] = !rafts && !(s->restitution[m->b] > 0) && c.point[i] &&
-                     hits[i].before > bt_max(hits[i].place, w->par.rest_speed);
-        any = any || strikes[i];
+                     hits[i].before > bt_max(place[i], w->par.rest_speed);
     }
     double area[2];
     const bt_patch now = bt_law_patch(w, p->part, m, c.gap + slop, &area[0]);
     const double free_way = bt_max(dt * c.approach - c.gap, least_way);
-    double way = free_way, end[2] = {0}, impulse[2] = {0};
+    double way = free_way;
     resistance r[2], found[2];
     for (int look = 0; look < LOOKS; look++) {
         const bt_patch then = bt_law_patch(w, p->part, m, c.gap + way, &area[1]);
-        double share[2][2];
-        for (int i = 0; i < m->n_points; i++)
-            share[0][i] = bt_law_share(m, i, now, &c), share[1][i] = bt_law_share(m, i, then, &c);
+        double length[2][2], all = now.length + then.length;
         for (int i = 0; i < m->n_points; i++) {
-            const double both[2] = {now.length * share[0][i], then.length * share[1][i]};
-            const double part = now.length + then.length > 0 ? (both[0] + both[1]) / (now.length + then.length) : 0;
-            found[i] = resistance_of(both, (double[2]){area[0] * share[0][i], area[0] * share[0][i] + (area[1] - area[0]) * part},
-                                     least, line, slop, way);
+            const double share = bt_law_share(m, i, now, &c);
+            length[i][0] = now.length * share, length[i][1] = then.length * bt_law_share(m, i, then, &c);
+            const double part = all > 0 ? (length[i][0] + length[i][1]) / all : 0, first = area[0] * share;
+            found[i] = resistance_of(length[i], (double[2]){first, first + (area[1] - area[0]) * part}, least, line,
+                                     slop, way);
             if (look == 0) r[i] = found[i];
+            take_resistance(&hits[i], &found[i], dt);
         }
-        if (!any) break;
-        collide(&mass, hits, found, m->n_points, dt, end, impulse);
+        if ((!strikes[0] && !strikes[1]) || !(way > least_way / NEAR)) break;
+        collide(&mass, hits, place, found, m->n_points, dt, in);
         double deep = least_way;
         for (int i = 0; i < m->n_points; i++)
-            if (strikes[i]) deep = bt_max(deep, dt * (end[i] - hits[i].place));
-        // a length that rises evenly is known everywhere
-        if (!(deep < 0.8 * way)) break;
+            if (strikes[i]) deep = bt_max(deep, isinf(found[i].kink) ? way : dt * in[i]);
+        if (!(deep < NEAR * way)) break;
         way = deep;
     }
     for (int i = 0; i < m->n_points; i++) {
-        if (strikes[i] && end[i] > hits[i].place && end[i] < hits[i].before && impulse[i] > 0)
-            bound_hit(l, i, &hits[i], end[i], impulse[i], dt * r[i].mean);
+        // Loads beyond the limit drive the point in ever faster: no stop to find the energy of.
+        if (strikes[i] && hits[i].load * hits[i].before < bt_hit_work(&hits[i], hits[i].before - place[i]))
+            bound_hit(l, i, &hits[i], place[i], dt * r[i].mean);
         else bound_push(l, i, &r[i], free_way, dt);
     }
 }
