@@ -149,8 +149,8 @@ bt_key bt_case_keys[] = {
     REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
          "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = "
          "rigid contact without limit"),
-    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]",
-         "least length of a contact / thickness of the floe that is crushed, assumed"),
+    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[0, 100]",
+         "least length of a contact / thickness of the floe that is crushed, assumed; 0: corners are sharp"),
     REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
          "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 "
          "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = without loss. Work / potential energy gained is "

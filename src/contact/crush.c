@@ -151,8 +151,8 @@ static double work_to(const resistance *r, double y)
 
 /// Of lengths at the depths `slop` and `way`, and areas of the overlap there; line: p h.
 ///
-/// ∫ l = l(0) y + c y^q has l(0), l(way) and the area right; q = 2 is a corner, 3/2 a disc, 1 an edge that lies flush at
-/// once. Two lines that are l and its slope at both ends have the area right if they meet at (1 − 1/q) way.
+/// ∫ l = l(0) y + c y^q has l(0), l(way) and the area right; q = 2: a corner, 3/2: a disc, 1: an edge, flush at once.
+/// Two lines that have l(0), and l and its slope at the way, have the area right if they meet at (1 − 1/q) way.
 static resistance resistance_of(const double length[2], const double area[2], double least, double line, double slop,
                                 double way)
 {

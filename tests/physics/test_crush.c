@@ -4,6 +4,7 @@
 
 #include "bergtow/outline.h"
 #include "contact/crush.h"
+#include "contact/hit.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
 
@@ -408,17 +409,18 @@ static void energy_at_any_time_step(void **state)
             o[2 * k] = r * cos(at), o[2 * k + 1] = r * sin(at);
         }
         const double tip = shape == CORNER || shape == BLUNT ? radius / cos(half) : radius;
-        const double m = 910 * h * bt_shape_moments(n, o).area, energy = 0.5 * m * v * v, least = shape == BLUNT ? 0.3 : 0;
+        const double energy = 0.5 * 910 * h * bt_shape_moments(n, o).area * v * v, least = shape == BLUNT ? 0.3 : 0;
         // The depth at which p h ∫ max(l, least) is the energy.
         double deep = 0, taken = 0;
         for (const double dd = 1e-6; taken < energy; deep += dd) {
             double l = 2 * radius;
             if (shape == CORNER || shape == BLUNT) l = 2 * deep;
             if (shape == RIM) { // of the polygon
-                double x = radius - deep;
-                for (int k = 0; k < n / 4; k++)
-                    if (o[2 * k] >= x && o[2 * k + 2] <= x)
-                        l = 2 * (o[2 * k + 1] + (o[2 * k] - x) / (o[2 * k] - o[2 * k + 2]) * (o[2 * k + 3] - o[2 * k + 1]));
+                const double x = radius - deep;
+                for (int k = 0; k < n / 4; k++) {
+                    const double *a = o + 2 * k, *b = a + 2;
+                    if (a[0] >= x && b[0] <= x) l = 2 * (a[1] + (a[0] - x) / (a[0] - b[0]) * (b[1] - a[1]));
+                }
             }
             taken += p0 * h * bt_max(l, least * h) * dd;
         }
@@ -451,6 +453,71 @@ static void energy_at_any_time_step(void **state)
         print_message("%s: off by %.2g, %.2g\n", name[shape], worst[0], worst[1]);
         assert_true(worst[0] < 0.005 && worst[1] < 0.005);
     }
+}
+
+/// In company the work of crushing is the energy lost, too, whatever the step: a heavy body comes in on a row of floes
+/// that lies against a wall, by a face or a corner; and one of four floes that touch ends with their common velocity.
+static void energy_in_company(void **state)
+{
+    (void)state;
+    const double p0 = 1.5e6, h = 1, v = 0.5, side = 30, sheet_1m = 910, half = 0.5 * side, reach = side / sqrt(2),
+                 steps[] = {0.002, 0.02, 0.1, 0.5, 1, 2, 5};
+    enum { FACE, TIP, FREE, KINDS };
+    for (int kind = 0; kind < KINDS; kind++)
+        for (int j = 0; j < 7; j++) {
+            const double dt = steps[j], line = p0 * h, heavy = kind == FREE ? 1 : 20;
+            bt_params p = scene_params(dt, side);
+            p.slop = 0.03, p.rest_speed = 0.005;
+            p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = p0, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            double square[8], corner[8] = {-reach, 0, 0, -reach, reach, 0, 0, reach};
+            scene_square(side, square);
+            bt_body_def d = scene_prism(4, kind == TIP ? corner : square, heavy * sheet_1m);
+            const double energy = 0.5 * d.mass * v * v * (kind == FREE ? 0.75 : 1);
+            d.vx = v, d.thickness = h, d.x = kind == TIP ? half - reach : 0;
+            bt_world_add(w, &d);
+            for (int k = 1; k < 4; k++) {
+                bt_body_def floe = scene_prism(4, square, sheet_1m);
+                floe.x = side * k, floe.thickness = h;
+                bt_world_add(w, &floe);
+            }
+            if (kind != FREE) scene_wall(w, 3.5 * side, -500, 900, 500, 0);
+            double work = 0;
+            for (int s = 0; s < 6 / dt + 30; s++) {
+                bt_world_step(w);
+                work += scene_law(w, "crushed_work");
+            }
+            CHECK_CLOSE(work, energy, 2e-3 * energy);
+            const double in = pose(w, 0)->x - d.x - pose(w, 3)->x + 3 * side;
+            if (kind == FREE) CHECK_CLOSE(vel(w, 0)->x, 0.25 * v, 1e-2 * v);
+            CHECK_CLOSE(kind == TIP ? line * in * in : line * side * in, energy, 0.01 * energy);
+            bt_world_free(w);
+        }
+}
+
+/// The end of a hit is where its curve meets the contact's own equation, and E has no step at the kink.
+static void the_curve_of_a_hit(void **state)
+{
+    (void)state;
+    uint64_t rng = 4;
+    int ends = 0;
+    for (int trial = 0; trial < 20000; trial++) {
+        const double w = pow(10, -6 * scene_uniform(&rng)), place = trial % 3 ? 0 : 0.4 * scene_uniform(&rng);
+        bt_hit h = {.before = place + scene_uniform(&rng), .load = trial % 2 ? 0 : 0.1 * scene_uniform(&rng) / w};
+        h.kink = trial % 4 ? 0.3 * scene_uniform(&rng) : 0;
+        h.touch = scene_uniform(&rng) / w, h.ramp = trial % 5 ? scene_uniform(&rng) / w : 0;
+        h.slope = scene_uniform(&rng) / w, h.force = h.touch + (h.ramp - h.slope) * h.kink;
+        h.work = h.kink * (h.touch - h.force + 0.5 * (h.ramp - h.slope) * h.kink);
+        CHECK_CLOSE(bt_hit_work(&h, h.kink * (1 + 1e-12)), bt_hit_work(&h, h.kink), 1e-9 / w);
+        const double free = h.before + w * h.load - 0.5 * scene_uniform(&rng), in = bt_hit_end(&h, place, free, w);
+        assert_true(in >= 0);
+        if (!(in > 0)) continue;
+        ends++;
+        CHECK_CLOSE(bt_hit_bound(&h, place, in), (free - place - in) / w, 1e-9 / w);
+        const double u = place + in, mean = 0.5 * (h.before + u); // energy lost is what crushing costs
+        CHECK_CLOSE((free - u) / w * mean - h.load * mean + h.load * u, bt_hit_work(&h, in), 1e-9 / w);
+    }
+    assert_true(ends > 10000);
 }
 
 /// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what
@@ -681,6 +748,8 @@ int main(void)
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
         cmocka_unit_test(energy_at_any_time_step),
+        cmocka_unit_test(energy_in_company),
+        cmocka_unit_test(the_curve_of_a_hit),
         cmocka_unit_test(friction_from_the_limit),
         cmocka_unit_test(memory),
         cmocka_unit_test(rebound_below_the_limit),

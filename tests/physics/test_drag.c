@@ -19,8 +19,8 @@ static void random_outline(uint64_t *rng, int n, double *v)
     bt_shape_centre(n, v);
 }
 
-/// ∮ form max(0, −v·n) u dl and its moment by the middles of many pieces; u: the flow past the arm, which has a share of
-/// what lies along the normal.
+/// ∮ form max(0, −v·n) u dl and its moment by the middles of many pieces; u: the flow past the arm, which has a share
+/// of what lies along the normal.
 static void plain_sum(int n, const double *v, double form, double share, double rx, double ry, double w, double f[3])
 {
     enum { PIECES = 4000 };
@@ -172,8 +172,8 @@ static void drag_never_reverses(void **state)
 }
 
 /// A rectangle 2a × 2b that turns in place, against closed forms: pressure has the moment ½ form ω² (a⁴ + b⁴), strip
-/// theory for both pairs of sides; drag along the local flow 2 a² b² form ω² more. And the force on one that does not turn is
-/// the same to the bit, whatever the share.
+/// theory for both pairs of sides; drag along the local flow 2 a² b² form ω² more. And the force on one that does not
+/// turn is the same to the bit, whatever the share.
 static void a_rectangle_that_turns(void **state)
 {
     (void)state;
