@@ -416,8 +416,6 @@ MUTANTS = {
         ("dt * dt * (r->mean - r->touch) / way", "2 * dt * dt * (r->mean - r->touch) / way", "not the mean force"),
         ("l->rise->hit[i] = *h;", ";", "no hit has its energy"),
         ("(last - length[0]) * slop / (way - slop)", "0", "looked at one slop deeper"),
-        ("hits[i].before > bt_max(place[i], w->par.rest_speed)", "hits[i].before > w->par.rest_speed",
-         "what does not come to touch hits"),
         ("!(s->restitution[m->b] > 0) &&", "", "no rebound"),
         ("if (!(deep < NEAR * way)) break;", "break;", "seen from afar alone"),
         ("r.work = r.kink * (r.touch - r.force + 0.5 * (r.ramp - r.slope) * r.kink);", "", "work up to the kink"),

@@ -455,6 +455,41 @@ static void energy_at_any_time_step(void **state)
     }
 }
 
+/// A corner at rest that a steady force L presses into a wall from now on goes in to 2 L/κ, F = κ d, where the force has
+/// given what crushing took. An edge shorter than the least length bears p h times that, both of its
+/// ends together.
+static void pressed_from_rest(void **state)
+{
+    (void)state;
+    const double h = 0.1, kappa = 2 * pressure * h, steps[] = {0.0005, 0.005, 0.05};
+    for (int j = 0; j < 3; j++) {
+        bt_params p = params(steps[j]);
+        p.slop = 1e-9, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        const double load = 0.1 * kappa;
+        double v[8] = {-0.5, 0, 0, -0.5, 0.5, 0, 0, 0.5};
+        p.tilt_ax = load / (0.5 * sheet);
+        bt_world *w = bt_world_create(&p);
+        add_floe(w, 4, v, 0, 0, 0, 0, h);
+        scene_wall(w, 0.5, -50, 5, 50, 0);
+        for (int s = 0; s < 1 / steps[j] + 4; s++) bt_world_step(w);
+        CHECK_CLOSE(pose(w, 0)->x, 2 * load / kappa, 0.25 * load / kappa); // -11 % at worst
+        CHECK_CLOSE(vel(w, 0)->x, 0, 1e-6);
+        CHECK_CLOSE(pushed(w), load * steps[j], 1e-6 * load);
+        bt_world_free(w);
+    }
+    for (int beyond = 0; beyond < 2; beyond++) {
+        bt_params p = params(0.005);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 20; // 2 m, the edge has 1 m
+        p.tilt_ax = (beyond ? 1.1 : 0.9) * 2 * pressure * h / sheet;
+        bt_world *w = bt_world_create(&p);
+        add_square(w, 0, 0, h);
+        scene_wall(w, 0.5, -50, 5, 50, 0);
+        for (int s = 0; s < 4; s++) bt_world_step(w);
+        assert_true((pose(w, 0)->x > 1e-9) == beyond);
+        bt_world_free(w);
+    }
+}
+
 /// In company the work of crushing is the energy lost, too, whatever the step: a heavy body comes in on a row of floes
 /// that lies against a wall, by a face or a corner; and one of four floes that touch ends with their common velocity.
 static void energy_in_company(void **state)
@@ -748,6 +783,7 @@ int main(void)
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
         cmocka_unit_test(energy_at_any_time_step),
+        cmocka_unit_test(pressed_from_rest),
         cmocka_unit_test(energy_in_company),
         cmocka_unit_test(the_curve_of_a_hit),
         cmocka_unit_test(friction_from_the_limit),
