@@ -50,6 +50,7 @@ typedef struct bt_drag_coefs {
     double water_skin; ///< C_ws, on ρ A
     double air_form;   ///< C_a, on ½ρ sail×width
     double air_skin;   ///< C_as, on ρ A
+    double tangential; ///< τ, share of the flow along a side in the moment of form drag
 } bt_drag_coefs;
 
 /// A velocity in time, read from a file: rows of time, x and y component; linear between them.

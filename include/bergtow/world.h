@@ -50,6 +50,7 @@ typedef struct bt_drag {
     double air_skin;    ///< ρ_a C_as A, kg/m
     double air_form;    ///< ½ ρ_a C_a sail, kg/m²
     double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
+    double tangential;  ///< share τ of the flow along a side in the moment of form drag (forces.h)
 } bt_drag;
 
 /// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its

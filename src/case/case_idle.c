@@ -66,7 +66,7 @@ static void list(const bt_case *c, idle out[RULES])
         {c->body.shape == BT_BODY_ABSENT,
          "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail body.density "
          "body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
-         "body.drag.water_skin body.drag.air_form body.drag.air_skin",
+         "body.drag.water_skin body.drag.air_form body.drag.air_skin body.drag.tangential",
          "body.shape", "without a towed body (body.shape: none)"},
         {c->body.shape == BT_BODY_ABSENT, "tow.ramp tow.direction impact.panels output.panels", "body.shape",
          "without a body that is towed (body.shape: none)"},

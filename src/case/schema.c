@@ -149,8 +149,8 @@ bt_key bt_case_keys[] = {
     REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
          "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = "
          "rigid contact without limit"),
-    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]",
-         "least length of a contact / thickness of the floe that is crushed, assumed"),
+    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[0, 100]",
+         "least length of a contact / thickness of the floe that is crushed, assumed; 0: corners are sharp"),
     REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
          "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 "
          "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = without loss. Work / potential energy gained is "
@@ -167,6 +167,9 @@ bt_key bt_case_keys[] = {
          "form drag of the floe's edge in air; that of icebergs [Hunke & Comeau 2011], assumed for floes"),
     REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]",
          "skin drag of air over a floe [Hunke & Comeau 2011]"),
+    REAL("ice.drag.tangential", ice.drag.tangential, RATIO, "0", "[0, 1]",
+         "share of the flow along a side that counts in the moment of form drag on floes; 0: pressure, as "
+         "body.drag.tangential"),
     CHOICE("ice.start", ice.start, starts, "drift",
            "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, "
            "water, Coriolis and slope at time zero balance, none across walls; rest: 0"),
@@ -242,6 +245,10 @@ bt_key bt_case_keys[] = {
          "form drag over the sail [Hunke & Comeau 2011]"),
     REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]",
          "skin drag of air over the body [Hunke & Comeau 2011]"),
+    REAL("body.drag.tangential", body.drag.tangential, RATIO, "0", "[0, 1]",
+         "share of the flow along a side that counts in the moment of form drag: 0 = pressure, along the normal "
+         "[cross-flow principle: Faltinsen 1990]; 1 = along the local flow, which damps turning two to four times as "
+         "much. The force on a body that does not turn is the same"),
 
     CHOICE("tow.mode", tow.mode, tow_modes, "speed",
            "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on "

@@ -27,15 +27,17 @@ bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j, const b
     return c;
 }
 
-bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way)
+bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way, double *area)
 {
     bt_overlap o;
+    double centroid[2];
     bt_overlap_clip(w, m->a, m->b, part, -way * m->nx, -way * m->ny, &o);
     double low = INFINITY, high = -INFINITY;
     for (int k = 0; k < o.n; k++) {
         const double t = m->nx * o.v[o.now][2 * k + 1] - m->ny * o.v[o.now][2 * k];
         low = bt_min(low, t), high = bt_max(high, t);
     }
+    *area = bt_overlap_area(&o, centroid);
     return o.n > 0 ? (bt_patch){high - low, 0.5 * (low + high)} : (bt_patch){0, NAN};
 }
 

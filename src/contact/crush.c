@@ -12,6 +12,7 @@
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
+#define NEAR 0.5 // of the way at which the overlap was looked at: nearer by than this, it is looked at again
 #define MOST_DEPTH 0.3 // of the mean floe size: beyond, outlines that stay as they were are no model
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
@@ -135,13 +136,114 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
+/// Force F(y) of the ice on one point that goes in by y, two lines, and its work E(y).
+typedef struct {
+    double touch, ramp;        ///< F = touch + ramp y up to `kink`, m; N, N/m
+    double kink;
+    double force, slope, work; ///< beyond it F = force + slope y and E = work + force y + ½ slope y²; N, N/m, J
+    double mean;               ///< E(way)/way, N
+} resistance;
+
+static double work_to(const resistance *r, double y)
+{
+    return y <= r->kink ? y * (r->touch + 0.5 * r->ramp * y) : r->work + y * (r->force + 0.5 * r->slope * y);
+}
+
+/// Of lengths at the depths `slop` and `way`, and areas of the overlap there; line: p h.
+///
+/// ∫ l = l(0) y + c y^q has l(0), l(way) and the area right; q = 2: a corner, 3/2: a disc, 1: an edge, flush at once.
+/// Two lines that have l(0), and l and its slope at the way, have the area right if they meet at (1 − 1/q) way.
+static resistance resistance_of(const double length[2], const double area[2], double least, double line, double slop,
+                                double way)
+{
+    const double last = bt_max(length[0], length[1]);
+    const double first = bt_max(0, length[0] - (last - length[0]) * slop / (way - slop)), rise = last - first;
+    resistance r = {.touch = line * bt_max(first, least), .kink = INFINITY};
+    r.mean = r.touch;
+    if (!(last > bt_max(first, least))) return r;
+    const double before = bt_max(0, area[0] - 0.5 * slop * (first + length[0]));
+    const double share = bt_max(0.5, bt_min(1, (area[1] - before - first * way) / (rise * way))); // 1/q
+    const double slope = rise / way * (1 / share - 1), at = last - slope * way;
+    const bool blunt = at < least; // the second line meets the least length
+    r.kink = blunt ? (least - at) / slope : (1 - share) * way;
+    r.force = line * at, r.slope = line * slope;
+    if (!blunt && r.kink > 0) r.ramp = bt_max(0, r.force + r.slope * r.kink - r.touch) / r.kink;
+    r.work = r.kink * (r.touch - r.force + 0.5 * (r.ramp - r.slope) * r.kink);
+    r.mean = bt_max(r.touch, work_to(&r, way) / way);
+    return r;
+}
+
+/// Ends of a lone collision, of both points at once, in turns: how far each goes in, m/s, and whether that is a stop.
+static void collide(const bt_mass *m, const bt_hit h[2], const double place[2], const resistance r[2], int n, double dt,
+                    double in[2])
+{
+    enum { TURNS = 2 };
+    double impulse[2] = {0};
+    // Where both are driven in alike the impulses are as the lengths.
+    for (int i = 0; i < n; i++) {
+        const double all = m->w[i] + (n > 1 && r[i].mean > 0 ? m->w12 * r[1 - i].mean / r[i].mean : 0);
+        const double w = all > 0.1 * m->w[i] ? all : m->w[i], free = h[i].before + w * h[i].load;
+        impulse[i] = bt_max(0, (free - place[i] - bt_hit_end(&h[i], place[i], free, w)) / w);
+    }
+    for (int turn = 0; turn < (n > 1 ? TURNS : 1); turn++)
+        for (int i = 0; i < n; i++) {
+            const double other = n > 1 ? m->w12 * (impulse[1 - i] - h[1 - i].load) : 0;
+            const double free = h[i].before + m->w[i] * h[i].load - other;
+            in[i] = h[i].before > place[i] ? bt_hit_end(&h[i], place[i], free, m->w[i]) : 0;
+            impulse[i] = bt_max(0, (free - place[i] - in[i]) * m->mn[i]);
+            if (!(in[i] > 0)) impulse[i] = bt_min(impulse[i], dt * r[i].touch);
+        }
+}
+
+/// Approaches before the step, and the loads: W load = what the free velocities have more.
+static void approach_of(const bt_world *w, const bt_contact *u, const bt_mass *m, bt_hit h[2])
+{
+    const bt_bodies *s = &w->bodies;
+    double gain[2] = {0};
+    for (int i = 0; i < u->n; i++) {
+        h[i].before = -bt_normal_velocity(u, i, &s->vel_start[u->a], &s->vel_start[u->b]);
+        gain[i] = -bt_normal_velocity(u, i, &s->vel_free[u->a], &s->vel_free[u->b]) - h[i].before;
+    }
+    for (int i = 0; i < u->n; i++) {
+        h[i].load = m->per_det > 0 ? (m->w[1 - i] * gain[i] - m->w12 * gain[1 - i]) * m->per_det : gain[i] * m->mn[i];
+        if (u->n > 1 && !(m->per_det > 0)) h[i].load *= 0.5;
+    }
+}
+
+/// The same of the ice, over a step.
+static void take_resistance(bt_hit *h, const resistance *r, double dt)
+{
+    h->touch = dt * r->touch, h->ramp = dt * dt * r->ramp, h->kink = r->kink / dt;
+    h->force = dt * r->force, h->slope = dt * dt * r->slope, h->work = r->work;
+}
+
+/// Work of crushing is the energy lost. What the loads give is borne without a way.
+static void bound_hit(bt_limit *l, int i, const bt_hit *h, double place, double most)
+{
+    l->flat[i] = bt_min(l->flat[i], bt_max(0, h->load * (h->before - place) / (h->before + place)));
+    l->most[i] = bt_min(l->most[i], most);
+    l->rise->hit[i] = *h;
+}
+
+/// The mean force over the way.
+static void bound_push(bt_limit *l, int i, const resistance *r, double way, double dt)
+{
+    const double flat = dt * r->touch;
+    l->flat[i] = bt_min(l->flat[i], flat);
+    l->most[i] = bt_min(l->most[i], dt * r->mean);
+    l->rise->base[i] = bt_min(l->flat[i], flat);
+    l->rise->slope[i] = dt * dt * (r->mean - r->touch) / way;
+}
+
 static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
+    enum { LOOKS = 4 };
     const bt_bodies *s = &w->bodies;
     const bt_contact *u = &t->contacts[j];
     bt_gaps *g = &t->gaps[j];
     bt_limit *l = &t->laws.limits[j];
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt, *own = w->par.law_own[BT_LAW_CRUSHING];
+    const double line = own[BT_CRUSH_PRESSURE] * h, slop = w->par.slop;
     const bt_mass mass = bt_mass_of(u, s->inv);
     const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
@@ -149,19 +251,46 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     if (!rafts) inherit(t, &names, m, l);
     for (int i = 0; i < m->n_points; i++) g->gap[i] += l->rise->depth[i];
     const bt_closing c = bt_law_closing(w, t, j, m);
-    const double per_length = own[BT_CRUSH_PRESSURE] * h * dt, least = own[BT_CRUSH_LEAST] * h / c.n;
-    const double way = bt_max(dt * c.approach - c.gap, LEAST_WAY * w->par.size);
-    const bt_patch now = bt_law_patch(w, p->part, m, c.gap + w->par.slop),
-                then = bt_law_patch(w, p->part, m, c.gap + w->par.slop + way);
+    const double least = own[BT_CRUSH_LEAST] * h / c.n, least_way = bt_max(LEAST_WAY * w->par.size, 2 * slop);
+    bt_hit hits[2] = {0};
+    double place[2] = {0}, in[2] = {0};
+    bool strikes[2] = {false};
+    approach_of(w, u, &mass, hits);
     for (int i = 0; i < m->n_points; i++) {
-        const double length = now.length * bt_law_share(m, i, now, &c),
-                     later = bt_max(length, then.length * bt_law_share(m, i, then, &c));
-        l->flat[i] = bt_min(l->flat[i], per_length * bt_max(length, least));
-        l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
-        if (later <= bt_max(length, least)) continue; // as long as it gets
-        const double k = own[BT_CRUSH_PRESSURE] * h * (later - length) / way;
-        l->rise->base[i] = bt_min(l->flat[i], per_length * length);
-        l->rise->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * mass.w[i]));
+        place[i] = bt_max(g->gap[i], 0) / dt;
+        strikes[i] = !rafts && !(s->restitution[m->b] > 0) && c.point[i] &&
+                     hits[i].before > bt_max(place[i], w->par.rest_speed);
+    }
+    double area[2];
+    const bt_patch now = bt_law_patch(w, p->part, m, c.gap + slop, &area[0]);
+    const double free_way = bt_max(dt * c.approach - c.gap, least_way);
+    double way = free_way;
+    resistance r[2], found[2];
+    for (int look = 0; look < LOOKS; look++) {
+        const bt_patch then = bt_law_patch(w, p->part, m, c.gap + way, &area[1]);
+        double length[2][2], all = now.length + then.length;
+        for (int i = 0; i < m->n_points; i++) {
+            const double share = bt_law_share(m, i, now, &c);
+            length[i][0] = now.length * share, length[i][1] = then.length * bt_law_share(m, i, then, &c);
+            const double part = all > 0 ? (length[i][0] + length[i][1]) / all : 0, first = area[0] * share;
+            found[i] = resistance_of(length[i], (double[2]){first, first + (area[1] - area[0]) * part}, least, line,
+                                     slop, way);
+            if (look == 0) r[i] = found[i];
+            take_resistance(&hits[i], &found[i], dt);
+        }
+        if ((!strikes[0] && !strikes[1]) || !(way > least_way / NEAR)) break;
+        collide(&mass, hits, place, found, m->n_points, dt, in);
+        double deep = least_way;
+        for (int i = 0; i < m->n_points; i++)
+            if (strikes[i]) deep = bt_max(deep, isinf(found[i].kink) ? way : dt * in[i]);
+        if (!(deep < NEAR * way)) break;
+        way = deep;
+    }
+    for (int i = 0; i < m->n_points; i++) {
+        // Loads beyond the limit drive the point in ever faster: no stop to find the energy of.
+        if (strikes[i] && hits[i].load * hits[i].before < bt_hit_work(&hits[i], hits[i].before - place[i]))
+            bound_hit(l, i, &hits[i], place[i], dt * r[i].mean);
+        else bound_push(l, i, &r[i], free_way, dt);
     }
 }
 

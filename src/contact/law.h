@@ -9,7 +9,7 @@
 // and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound
 // holds, and the law that sets it gives way. The bounds of all laws have one shape, so that there is one update of a
 // contact for all of them (solve/limit.h):
-//     L(w) = min(most, max(flat, base + slope (−w − place)))
+//     L(w) = min(most, max(flat, rise(−w − place))),   rise: a line, or the curve of contact/hit.h
 //
 // Memory. What a law remembers of a pair is one record, bt_memory (space/cells.h), kept in the cell that owns the pair,
 // sorted by (a, b, part, law). It is state: it goes with the pair to other cells and ranks, into checkpoints, and into
@@ -30,6 +30,7 @@
 #include "bergtow/case.h"
 #include "bergtow/quantity.h"
 #include "contact/contacts.h"
+#include "contact/hit.h"
 #include "space/phases.h"
 #include "space/cells.h"
 
@@ -71,10 +72,11 @@ typedef struct bt_law_total {
 /// A total over a run: whole of BT_TOTAL_STEPS, else real.
 typedef union bt_total_value { double real; int64_t whole; } bt_total_value;
 
-/// The rising part of the bounds of one contact (contact/crush.h).
+/// The rising part of the bounds of one contact (contact/crush.h): a line, or that of a hit.
 typedef struct bt_rise {
     double base[2];  ///< never above flat, N s
     double slope[2]; ///< kg
+    bt_hit hit[2];   ///< before = 0: none
     double depth[2]; ///< crushed so far, m
 } bt_rise;
 
@@ -204,8 +206,9 @@ typedef struct bt_patch {
     double length, middle; ///< m, m from the centroid of a along the tangent; NaN where they do not overlap
 } bt_patch;
 
-/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent.
-bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way);
+/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent; *area: of the
+/// overlap, m².
+bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way, double *area);
 
 /// Share of a patch that falls to point i of the manifold, of those that take part: uniform pressure on it, as forces
 /// at the points. NaN: to each alike.

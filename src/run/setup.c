@@ -88,6 +88,7 @@ static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body
     d->thickness = h;
     d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
                              c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
+    d->drag.tangential = c->ice.drag.tangential;
 }
 
 static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roster *r)
@@ -196,6 +197,7 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
             bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
                            c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
     };
+    d.drag.tangential = c->body.drag.tangential;
     bt_tow *t = w->tow = bt_setup_tow(c);
     if (prescribed) {
         const double s = bt_tow_speed(t, 0);

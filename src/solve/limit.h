@@ -17,21 +17,26 @@ static inline const bt_rise *bt_rise_of(const bt_limit *l)
 
 /// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising
 /// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
-/// slope W), where it is above the flat part exactly when that is so at the solution. `place` and not the bias: a
-/// rebound is no crushing.
+/// slope W), and that of a hit where a quadratic equation has its root; there it is above the flat part exactly when
+/// that is so at the solution. `place` and not the bias: a rebound is no crushing.
 static inline double bt_limit_point(const bt_limit *l, const bt_contact *u, const bt_mass *m, int i, double b)
 {
     const bt_rise *r = bt_rise_of(l);
-    const double rising = (r->base[i] - r->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + r->slope[i] * m->w[i]);
+    const double free = u->bias[i] - b, w = m->w[i]; // approach
+    const double rising = r->hit[i].before > 0
+                              ? (free - l->place[i] - bt_hit_end(&r->hit[i], l->place[i], free, w)) / w
+                              : (r->base[i] + r->slope[i] * (free - l->place[i])) / (1 + r->slope[i] * w);
     return bt_max(0, bt_min(-b * m->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
 }
 
 /// Bound of point i at these velocities, N s.
 static inline double bt_limit_bound(const bt_limit *l, const bt_contact *u, int i, const bt_vel *v)
 {
-    const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
+    const double approach = bt_max(0, -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]));
     const bt_rise *r = bt_rise_of(l);
-    return bt_min(l->most[i], bt_max(l->flat[i], r->base[i] + r->slope[i] * bt_max(0, approach)));
+    const double rising = r->hit[i].before > 0 ? bt_hit_bound(&r->hit[i], l->place[i], approach)
+                                               : r->base[i] + r->slope[i] * approach;
+    return bt_min(l->most[i], bt_max(l->flat[i], rising));
 }
 
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
@@ -64,7 +69,7 @@ static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const bt
     l[1] = (m->w12 * b[0] - m->w[0] * b[1]) * m->per_det;
     if (m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
     const bt_rise *r = bt_rise_of(k);
-    if (r->slope[0] == 0 && r->slope[1] == 0) {
+    if (r->slope[0] == 0 && r->slope[1] == 0 && !(r->hit[0].before > 0 || r->hit[1].before > 0)) {
         bt_limit_rim(m, b, k->flat, l);
         return;
     }

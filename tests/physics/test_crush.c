@@ -4,6 +4,7 @@
 
 #include "bergtow/outline.h"
 #include "contact/crush.h"
+#include "contact/hit.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
 
@@ -91,12 +92,11 @@ static void stop_at_constant_force(void **state)
         energy += w->stats.contact_work;
         if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
     }
-    CHECK_CLOSE(stopped, gap / v + v / brake, 2 * dt);
+    CHECK_CLOSE(stopped, gap / v + v / brake, 8 * dt); // what is left of its speed is squared from step to step
     CHECK_CLOSE(pose(w, 0)->x, scene_law(w, "crushed_depth"), 1e-9);
-    CHECK_CLOSE(scene_law(w, "crushed_depth"), 0.5 * v * v / brake, v * dt);
+    CHECK_CLOSE(scene_law(w, "crushed_depth"), 0.5 * v * v / brake, 1e-9);
     CHECK_CLOSE(energy, -0.5 * sheet * v * v, 1e-9 * sheet * v * v);
-    // all but what the last step took below the limit
-    CHECK_CLOSE(work, 0.5 * sheet * v * v, sheet * brake * brake * dt * dt);
+    CHECK_CLOSE(work, 0.5 * sheet * v * v, 1e-9 * sheet * v * v);
     bt_world_free(w);
 }
 
@@ -336,7 +336,8 @@ static void two_floes(void **state)
     d.motion = BT_STATIC, d.large = true, d.x = 1.5, d.y = 1.25; // reaches down to y = 0.25: a quarter of the edge
     bt_world_add(w, &d);
     bt_world_step(w);
-    CHECK_CLOSE(pushed(w) / dt, pressure * 0.3 * 0.25, 1e-6 * pressure);
+    // by the energy, F Δt 2 u/(v + u): the slab meets two ends of the edge's part at two speeds
+    CHECK_CLOSE(pushed(w) / dt, pressure * 0.3 * 0.25, 0.005 * pressure * 0.3 * 0.25);
     bt_world_free(w);
 }
 
@@ -377,16 +378,181 @@ static void corner(void **state)
             }
             if (j == 0) {
                 CHECK_CLOSE(depth, deep, 0.005 * deep);
-                CHECK_CLOSE(stopped, 0.5 * BT_PI * sqrt(m / k), 2 * dt);
+                CHECK_CLOSE(stopped, 0.5 * BT_PI * sqrt(m / k), 8 * dt);
                 CHECK_CLOSE(work, 0.5 * m * v * v, 0.005 * 0.5 * m * v * v);
             }
             print_message("dt √(k/m) %g: depth %.3f of v √(m/k)\n", steps[j], depth / deep);
-            assert_true(depth > 0.7 * deep && depth < 1.001 * deep);
+            CHECK_CLOSE(depth, deep, 1e-3 * deep);
+            CHECK_CLOSE(work, 0.5 * m * v * v, 1e-3 * m * v * v);
             CHECK_CLOSE(pose(w, 0)->x, depth, 1e-6);
             assert_true(w->stats.overlap <= 1e-9);
             bt_world_free(w);
         }
     }
+}
+
+/// A floe of 30 m at full scale meets a wall by its face, a corner, a disc's rim, at 0.5 m/s, from a gap to cross
+/// first or none: its depth is the one at which crushing has taken its kinetic energy, and its work that energy.
+static void energy_at_any_time_step(void **state)
+{
+    (void)state;
+    const double p0 = 1.5e6, h = 1, v = 0.5, steps[] = {0.002, 0.01, 0.05, 0.1, 0.2, 0.5, 1, 2, 5},
+                 gaps[] = {0, 0.03, 0.37, 0.9};
+    enum { FACE, CORNER, BLUNT, RIM, SHAPES };
+    const char *name[] = {"face", "corner", "blunt corner", "rim"};
+    for (int shape = 0; shape < SHAPES; shape++) {
+        double o[2 * BT_MAX_VERTICES], worst[2] = {0};
+        const int n = shape == RIM ? 32 : 4;
+        const double radius = 15, half = BT_PI / n;
+        for (int k = 0; k < n; k++) { // a corner at +x, or an edge
+            const double at = 2 * half * k + (shape == FACE || shape == RIM ? half : 0), r = radius / cos(half);
+            o[2 * k] = r * cos(at), o[2 * k + 1] = r * sin(at);
+        }
+        const double tip = shape == CORNER || shape == BLUNT ? radius / cos(half) : radius;
+        const double energy = 0.5 * 910 * h * bt_shape_moments(n, o).area * v * v, least = shape == BLUNT ? 0.3 : 0;
+        // The depth at which p h ∫ max(l, least) is the energy.
+        double deep = 0, taken = 0;
+        for (const double dd = 1e-6; taken < energy; deep += dd) {
+            double l = 2 * radius;
+            if (shape == CORNER || shape == BLUNT) l = 2 * deep;
+            if (shape == RIM) { // of the polygon
+                const double x = radius - deep;
+                for (int k = 0; k < n / 4; k++) {
+                    const double *a = o + 2 * k, *b = a + 2;
+                    if (a[0] >= x && b[0] <= x) l = 2 * (a[1] + (a[0] - x) / (a[0] - b[0]) * (b[1] - a[1]));
+                }
+            }
+            taken += p0 * h * bt_max(l, least * h) * dd;
+        }
+        for (int j = 0; j < 9; j++)
+            for (int k = 0; k < 4; k++) {
+                const double dt = steps[j];
+                bt_params p = scene_params(dt, 30);
+                p.slop = 0.03;
+                p.rest_speed = 0.005;
+                p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = p0;
+                p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = least;
+                bt_world *w = bt_world_create(&p);
+                bt_body_def d = scene_prism(n, o, 910 * h);
+                d.vx = v, d.thickness = h;
+                bt_world_add(w, &d);
+                const double gap = gaps[k] * v * dt;
+                scene_wall(w, tip + gap, -500, tip + 500, 500, 0);
+                double work = 0, depth = 0;
+                for (int s = 0; s < 4 / dt + 8; s++) {
+                    bt_world_step(w);
+                    assert_true(w->stats.converged);
+                    work += scene_law(w, "crushed_work");
+                    depth = bt_max(depth, scene_law(w, "crushed_depth"));
+                }
+                const double off[2] = {fabs(depth / deep - 1), fabs(work / energy - 1)};
+                for (int i = 0; i < 2; i++) worst[i] = bt_max(worst[i], off[i]);
+                CHECK_CLOSE(pose(w, 0)->x - gap, depth, 1e-6);
+                bt_world_free(w);
+            }
+        print_message("%s: off by %.2g, %.2g\n", name[shape], worst[0], worst[1]);
+        assert_true(worst[0] < 0.005 && worst[1] < 0.005);
+    }
+}
+
+/// A corner at rest that a steady force L presses into a wall from now on goes in to 2 L/κ, F = κ d, where the force has
+/// given what crushing took. An edge shorter than the least length bears p h times that, both of its
+/// ends together.
+static void pressed_from_rest(void **state)
+{
+    (void)state;
+    const double h = 0.1, kappa = 2 * pressure * h, steps[] = {0.0005, 0.005, 0.05};
+    for (int j = 0; j < 3; j++) {
+        bt_params p = params(steps[j]);
+        p.slop = 1e-9, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        const double load = 0.1 * kappa;
+        double v[8] = {-0.5, 0, 0, -0.5, 0.5, 0, 0, 0.5};
+        p.tilt_ax = load / (0.5 * sheet);
+        bt_world *w = bt_world_create(&p);
+        add_floe(w, 4, v, 0, 0, 0, 0, h);
+        scene_wall(w, 0.5, -50, 5, 50, 0);
+        for (int s = 0; s < 1 / steps[j] + 4; s++) bt_world_step(w);
+        CHECK_CLOSE(pose(w, 0)->x, 2 * load / kappa, 0.25 * load / kappa); // -11 % at worst
+        CHECK_CLOSE(vel(w, 0)->x, 0, 1e-6);
+        CHECK_CLOSE(pushed(w), load * steps[j], 1e-6 * load);
+        bt_world_free(w);
+    }
+    for (int beyond = 0; beyond < 2; beyond++) {
+        bt_params p = params(0.005);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 20; // 2 m, the edge has 1 m
+        p.tilt_ax = (beyond ? 1.1 : 0.9) * 2 * pressure * h / sheet;
+        bt_world *w = bt_world_create(&p);
+        add_square(w, 0, 0, h);
+        scene_wall(w, 0.5, -50, 5, 50, 0);
+        for (int s = 0; s < 4; s++) bt_world_step(w);
+        assert_true((pose(w, 0)->x > 1e-9) == beyond);
+        bt_world_free(w);
+    }
+}
+
+/// In company the work of crushing is the energy lost, too, whatever the step: a heavy body comes in on a row of floes
+/// that lies against a wall, by a face or a corner; and one of four floes that touch ends with their common velocity.
+static void energy_in_company(void **state)
+{
+    (void)state;
+    const double p0 = 1.5e6, h = 1, v = 0.5, side = 30, sheet_1m = 910, half = 0.5 * side, reach = side / sqrt(2),
+                 steps[] = {0.002, 0.02, 0.1, 0.5, 1, 2, 5};
+    enum { FACE, TIP, FREE, KINDS };
+    for (int kind = 0; kind < KINDS; kind++)
+        for (int j = 0; j < 7; j++) {
+            const double dt = steps[j], line = p0 * h, heavy = kind == FREE ? 1 : 20;
+            bt_params p = scene_params(dt, side);
+            p.slop = 0.03, p.rest_speed = 0.005;
+            p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = p0, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            double square[8], corner[8] = {-reach, 0, 0, -reach, reach, 0, 0, reach};
+            scene_square(side, square);
+            bt_body_def d = scene_prism(4, kind == TIP ? corner : square, heavy * sheet_1m);
+            const double energy = 0.5 * d.mass * v * v * (kind == FREE ? 0.75 : 1);
+            d.vx = v, d.thickness = h, d.x = kind == TIP ? half - reach : 0;
+            bt_world_add(w, &d);
+            for (int k = 1; k < 4; k++) {
+                bt_body_def floe = scene_prism(4, square, sheet_1m);
+                floe.x = side * k, floe.thickness = h;
+                bt_world_add(w, &floe);
+            }
+            if (kind != FREE) scene_wall(w, 3.5 * side, -500, 900, 500, 0);
+            double work = 0;
+            for (int s = 0; s < 6 / dt + 30; s++) {
+                bt_world_step(w);
+                work += scene_law(w, "crushed_work");
+            }
+            CHECK_CLOSE(work, energy, 2e-3 * energy);
+            const double in = pose(w, 0)->x - d.x - pose(w, 3)->x + 3 * side;
+            if (kind == FREE) CHECK_CLOSE(vel(w, 0)->x, 0.25 * v, 1e-2 * v);
+            CHECK_CLOSE(kind == TIP ? line * in * in : line * side * in, energy, 0.01 * energy);
+            bt_world_free(w);
+        }
+}
+
+/// The end of a hit is where its curve meets the contact's own equation, and E has no step at the kink.
+static void the_curve_of_a_hit(void **state)
+{
+    (void)state;
+    uint64_t rng = 4;
+    int ends = 0;
+    for (int trial = 0; trial < 20000; trial++) {
+        const double w = pow(10, -6 * scene_uniform(&rng)), place = trial % 3 ? 0 : 0.4 * scene_uniform(&rng);
+        bt_hit h = {.before = place + scene_uniform(&rng), .load = trial % 2 ? 0 : 0.1 * scene_uniform(&rng) / w};
+        h.kink = trial % 4 ? 0.3 * scene_uniform(&rng) : 0;
+        h.touch = scene_uniform(&rng) / w, h.ramp = trial % 5 ? scene_uniform(&rng) / w : 0;
+        h.slope = scene_uniform(&rng) / w, h.force = h.touch + (h.ramp - h.slope) * h.kink;
+        h.work = h.kink * (h.touch - h.force + 0.5 * (h.ramp - h.slope) * h.kink);
+        CHECK_CLOSE(bt_hit_work(&h, h.kink * (1 + 1e-12)), bt_hit_work(&h, h.kink), 1e-9 / w);
+        const double free = h.before + w * h.load - 0.5 * scene_uniform(&rng), in = bt_hit_end(&h, place, free, w);
+        assert_true(in >= 0);
+        if (!(in > 0)) continue;
+        ends++;
+        CHECK_CLOSE(bt_hit_bound(&h, place, in), (free - place - in) / w, 1e-9 / w);
+        const double u = place + in, mean = 0.5 * (h.before + u); // energy lost is what crushing costs
+        CHECK_CLOSE((free - u) / w * mean - h.load * mean + h.load * u, bt_hit_work(&h, in), 1e-9 / w);
+    }
+    assert_true(ends > 10000);
 }
 
 /// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what
@@ -404,17 +570,18 @@ static void friction_from_the_limit(void **state)
     d.inertia *= 1e9; // both points are at the limit: nothing else would keep it from turning
     bt_world_add(w, &d);
     scene_wall(w, 0.5, -50, 5, 50, mu);
-    double work = 0, crushed = 0;
+    double work = 0, crushed = 0, friction = 0;
     for (int s = 0; s < 400; s++) {
+        const bt_vel last = *vel(w, 0);
         bt_world_step(w);
         assert_true(w->stats.converged);
         work += w->stats.contact_work;
         crushed += scene_law(w, "crushed_work");
+        friction += mu * sheet * (last.x - vel(w, 0)->x) * 0.5 * (last.y + vel(w, 0)->y);
         if (s * dt < 0.9 * v / brake) {
-            CHECK_CLOSE(slide - vel(w, 0)->y, mu * brake * (s + 1) * dt, 1e-8);
+            CHECK_CLOSE(slide - vel(w, 0)->y, mu * (v - vel(w, 0)->x), 1e-8);
+            CHECK_CLOSE(v - vel(w, 0)->x, brake * (s + 1) * dt, 0.01 * v);
             const double before = 0.5 * sheet * (v * v + slide * slide);
-            // mean of both ends of the steps
-            const double friction = mu * pressure * h * (pose(w, 0)->y + 0.5 * dt * (slide - vel(w, 0)->y));
             CHECK_CLOSE(before - w->stats.kinetic_energy, crushed + friction, 1e-7 * before);
         }
         CHECK_CLOSE(work, w->stats.kinetic_energy - 0.5 * sheet * (v * v + slide * slide), 1e-8 * sheet);
@@ -459,7 +626,8 @@ static void memory(void **state)
         }
         CHECK_CLOSE(free_until, away[i] < 1 ? start : 0, 2 * back * dt);
         assert_true(w->stats.overlap <= 1e-9);
-        if (away[i] < 1) CHECK_CLOSE(pose(w, 0)->x, start, 1e-6); // m v < p h L Δt: the dent bears it
+        const double again = 0.5 * back * back / (pressure * h / sheet); // its energy goes on crushing
+        if (away[i] < 1) CHECK_CLOSE(pose(w, 0)->x, start + again, 1e-6);
     }
     bt_world_free(w);
 }
@@ -513,7 +681,7 @@ static void body_at_a_set_speed(void **state)
     for (int s = 0; s < 20; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);
-        if (s == 0) continue; // the floes are set in motion
+        if (s < 12) continue; // the floes are set in motion
         const bt_cell *t = w->cells->cell;
         for (bt_idx k = 0; k < w->cells->n; k++)
             for (bt_idx j = 0; j < t[k].n_contacts; j++)
@@ -522,7 +690,8 @@ static void body_at_a_set_speed(void **state)
         CHECK_CLOSE(scene_law(w, "crushed_work"), 0.5 * pressure * h * 0.1 * dt, 1e-6 * pressure * h);
     }
     // The thin floe's two sides share what is crushed.
-    CHECK_CLOSE(pose(w, 0)->x, 0.2, 1e-6);
+    // The first floe is hit while others hold it: up to half its share of the limit of that step is crushed, 1/4 + ...
+    assert_true(pose(w, 0)->x > 0.2 - 0.006 && pose(w, 0)->x < 0.2 + 1e-6);
     CHECK_CLOSE(pose(w, 3)->x, 3, 1e-6);
     assert_true(pose(w, 2)->x > 2 - 1e-6 && pose(w, 2)->x < 2.2 + 1e-6);
     bt_world_free(w);
@@ -613,6 +782,10 @@ int main(void)
         cmocka_unit_test(sliding_back_brings_no_overlap),
         cmocka_unit_test(two_floes),
         cmocka_unit_test(corner),
+        cmocka_unit_test(energy_at_any_time_step),
+        cmocka_unit_test(pressed_from_rest),
+        cmocka_unit_test(energy_in_company),
+        cmocka_unit_test(the_curve_of_a_hit),
         cmocka_unit_test(friction_from_the_limit),
         cmocka_unit_test(memory),
         cmocka_unit_test(rebound_below_the_limit),
