@@ -227,14 +227,13 @@ static double take_losses(const bt_world *w, bt_cell *t, bt_idx edge)
     return losses * reached(w, u, t->gaps[edge].gap[0]);
 }
 
-/// edge: contact of the same pair that has its bounds already, −1 = none.
+/// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
 static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, const bt_memory *r)
 {
     bt_contact *u = &t->contacts[j];
     bt_limit *l = &t->laws.limits[j];
     const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
     l->flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
-    l->centre[0] = l->centre[1] = 0;
     if (edge >= 0) {
         const double half = 0.5 * take_losses(w, t, edge);
         l->flat[0] += half;
