@@ -199,15 +199,15 @@ static bt_patch flush_part(const bt_manifold *m)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-/// How much of the losses an edge bears: all of them where it is at the largest area, or comes there in the step by the
-/// velocities without contacts; none from one slop before that on.
+/// Part of the losses that an edge bears: of the way that it would make in the step by the velocities without contacts
+/// what is left beyond the gap, with a slop on both.
 static double reached(const bt_world *w, const bt_contact *edge, double gap)
 {
     const bt_bodies *s = &w->bodies;
     const double before = bt_mean_normal_velocity(edge, &s->vel_start[edge->a], &s->vel_start[edge->b]),
                  free = bt_mean_normal_velocity(edge, &s->vel_free[edge->a], &s->vel_free[edge->b]);
-    const double left = gap - w->par.dt * bt_max(0, -bt_min(before, free));
-    return bt_max(0, bt_min(1, 1 - left / least_blend(w)));
+    const double way = w->par.dt * bt_max(0, -bt_min(before, free));
+    return bt_max(0, 1 - gap / (way + least_blend(w)));
 }
 
 /// Leaves an edge the stored part of its bound. Returns the rest, R of raft.h, N s.

@@ -39,9 +39,11 @@
 // friction on an edge that has rafted. Pairs that have not have it, and as with all Coulomb friction uniqueness is not
 // shown for them.
 // Below A*, R is not due. It is taken times
-//     min(1, max(0, 1 − (gap − Δt c)/slop))
-// c: approach of the edge by the velocities without contacts. A cut without that taper would let an edge that bears
-// load in a residual's time, and sheets would creep.
+//     max(0, 1 − gap/(Δt c + slop))
+// c: approach of the edge by the velocities without contacts. So a gap that is crossed in a step of any length takes
+// the losses of what goes under beyond it, and none where it is not crossed but for a slop: a cut there would let go of
+// an edge that bears load whenever a residual opens it, and sheets would creep. Rejected: all of R in a step in which
+// the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work for the same area).
 // Rejected: losses in the load on the chord (λ <= q0 L): it pushes sheets aside with five times what is stored, and a
 // row of squares that is 1 cm out of line slips out. A force R cos α against the motion, which costs the same for an
 // area in every direction: not monotone, and at rest it may bear any load of the disc while it bears none when it

@@ -9,6 +9,7 @@
 
 #include "contact/overlap.h"
 #include "contact/raft.h"
+#include "output/observe.h"
 
 static const double ice = 910, water = 1027, gravity = 9.81, kappa = 8, mu = 0.3, h = 1;
 
@@ -90,7 +91,7 @@ static void two_squares(void **state)
     const double a = 10, v = 0.05, dt = 0.1;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
-    add_box(w, HELD, a, a, -0.5 * a, 0, h);
+    const bt_gid held = add_box(w, HELD, a, a, -0.5 * a, 0, h);
     const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 1e-6, h); // sides that all but lie on each other
     scene_wall(w, -2 * a, 0.5 * a + 1e-5, 2 * a, 2 * a, 0);
     scene_wall(w, -2 * a, -2 * a, 2 * a, -0.5 * a - 1e-5, 0);
@@ -108,6 +109,9 @@ static void two_squares(void **state)
         if (depth > 0.1) CHECK_CLOSE(f, a * (edge_load() + sheet_load() * (depth - v * dt)), 0.002 * f);
         if (depth > 0.1) CHECK_CLOSE(scene_law(w, "rafted_area"), a * (depth - v * dt), 1e-5 * a);
         assert_true(w->stats.overlap < 0.02);
+        double force[16] = {0};
+        bt_observe_contact_force(w, force);
+        if (depth > 0.1) CHECK_CLOSE(force[bt_world_index(w, held)], a * edge_load(), 0.002 * f); // without friction
     }
     CHECK_CLOSE(edge, edge_load() * a * depth, 0.01 * edge);
     CHECK_CLOSE(friction, 0.5 * sheet_load() * a * depth * depth, 0.01 * friction);
@@ -511,8 +515,8 @@ static void a_row_out_of_line(void **state)
 }
 
 /// What it costs to cover an area, at an angle to the edge: E' + (q0 − E') (1 + cos α)/(2 cos α). Sliding along the
-/// edge costs half of the losses, the way back nothing; whatever friction there is between sheets besides. The floe is so
-/// heavy that nothing stops it.
+/// edge costs half of the losses, the way back nothing; whatever friction there is between sheets besides. The floe is
+/// so heavy that nothing stops it.
 static void the_cost_of_an_angle(void **state)
 {
     (void)state;
@@ -543,6 +547,35 @@ static void the_cost_of_an_angle(void **state)
         const double losses = 0.5 * (edge_load() - stored) * a * (1 + c);
         const double want = c >= 0 ? stored * a * c + losses : 0;
         CHECK_CLOSE(work / way, want, 1e-8 * edge_load() * a);
+        bt_world_free(w);
+    }
+}
+
+/// A heavy floe slides back by 0.2 m, and comes on: in a step that leaves it short of where it was the edge bears
+/// nothing; in one of 0.5 m the losses are those of 0.3 m, within a slop.
+static void a_gap_is_crossed_in_a_step(void **state)
+{
+    (void)state;
+    const double a = 10, stored = rise() * h * h, on[] = {0.1, 0.5};
+    for (int i = 0; i < 2; i++) {
+        bt_params p = params(1);
+        bt_world *w = bt_world_create(&p);
+        add_box(w, HELD, a, 10 * a, -0.5 * a, 0, h);
+        double outline[8];
+        scene_square(a, outline);
+        bt_body_def d = scene_prism(4, outline, 1e13);
+        d.x = 0.5 * a + 0.001, d.thickness = h;
+        const bt_gid floe = bt_world_add(w, &d);
+        set_speed(w, floe, -0.5);
+        for (int k = 0; k < 4; k++) bt_world_step(w);
+        vel(w, floe)->x = 0.2;
+        bt_world_step(w);
+        CHECK_CLOSE(scene_law(w, "raft_edge_work"), 0, 0.01 * edge_load() * a);
+        vel(w, floe)->x = -on[i];
+        bt_world_step(w);
+        const double beyond = i == 0 ? 0 : on[i] * (1 - 0.2 / (on[i] + p.slop));
+        const double want = i == 0 ? 0 : a * (stored * on[i] + (edge_load() - stored) * beyond);
+        CHECK_CLOSE(scene_law(w, "raft_edge_work"), want, 1e-6 * edge_load() * a);
         bt_world_free(w);
     }
 }
@@ -645,6 +678,7 @@ int main(void)
         cmocka_unit_test(plough_in_a_channel),
         cmocka_unit_test(a_row_out_of_line),
         cmocka_unit_test(the_cost_of_an_angle),
+        cmocka_unit_test(a_gap_is_crossed_in_a_step),
         cmocka_unit_test(stored_and_lost_is_work),
         cmocka_unit_test(cold_and_warm),
         cmocka_unit_test(energy_is_booked),
