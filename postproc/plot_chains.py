@@ -44,11 +44,20 @@ def read(path):
                                "write it with --dump-contacts of this version")
             places = f["places"]
             dt = float(places.attrs["dt"])
-            force = f["solution/r"][()][::2] / dt
-            # Floes that lie over each other rub: a contact of its own, without a normal force.
-            edge = np.isnan(f["disc"][()]) if "disc" in f else np.ones(len(force), bool)
-            return Contacts(float(places.attrs["time"]), places["body"][()][edge], places["normal"][()][edge],
-                            places["lever"][()].reshape(-1, 2, 2)[edge], force[edge], places["pose"][()])
+            impulse, normal = f["solution/r"][()].reshape(-1, 2), places["normal"][()]
+            force, drawn = impulse[:, 0] / dt, np.ones(len(impulse), bool)
+            # Floes that lie over each other have a contact of its own: losses of their edge, along the middle of its
+            # disc and at most twice as far, and friction, which is no normal force.
+            if "disc" in f:
+                sheets = ~np.isnan(f["disc"][()])
+                centre = (f["centre"][()] if "centre" in f else np.zeros(2 * len(force))).reshape(-1, 2)
+                half = np.hypot(*centre.T)
+                drawn = ~sheets | (half > 0)
+                at = sheets & drawn
+                normal[at] = centre[at] / half[at, None]
+                force[at] = np.clip((impulse * normal).sum(axis=1)[at], 0, 2 * half[at]) / dt
+            return Contacts(float(places.attrs["time"]), places["body"][()][drawn], normal[drawn],
+                            places["lever"][()].reshape(-1, 2, 2)[drawn], force[drawn], places["pose"][()])
     except FileNotFoundError:
         raise RunError(path, "no such file",
                        "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None

@@ -85,7 +85,10 @@ typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach; flat[0] of sheets: the radius of their disc, N s
     double most[2];  ///< N s
     double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
-    double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
+    union {
+        double place[2];  ///< approach that closes the gap, and nothing gives way, m/s
+        double centre[2]; ///< of sheets: where the middle of their disc is, along x and y, N s
+    };
     double grown[2]; ///< by how much the bodies go into each other in this step, m
     bt_rise *rise;   ///< NULL where no law has a rising bound
     int32_t record[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none

@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "contact/overlap.h"
+#include "contact/row.h"
 #include "contact/work.h"
 #include "base/elementary.h"
 #include "case/case_derived.h"
@@ -25,8 +26,7 @@ static const bt_law_number numbers[] = {
                 "potential energy of floes that lie over each other, above that of floes side by side", BT_KEEP_LAST,
                 .key = "rafted_energy_j"},
     [EDGE_WORK] = {"raft_edge_work", "J",
-                   "work taken by edges that raft: their load is at the bound; part of it is in rafted_energy, the "
-                   "rest is lost",
+                   "work taken where edges raft; part of it is in rafted_energy, the rest is lost",
                    BT_KEEP_SUM, .key = "raft_edge_work_j"},
     [FRICTION_WORK] = {"raft_friction_work", "J", "work taken by friction between floes that lie over each other",
                        BT_KEEP_SUM, .key = "raft_friction_work_j"},
@@ -109,6 +109,16 @@ static double line_load(const bt_world *w, bt_idx a, bt_idx b)
     return own_of(w)[BT_RAFT_LINE] * h * h;
 }
 
+/// What the sheets gain in height, of that: E', N/m.
+static double stored_load(const bt_world *w, bt_idx a, bt_idx b)
+{
+    const double *h = w->bodies.thickness;
+    return bt_min(own_of(w)[BT_RAFT_RISE] * h[a] * h[b], line_load(w, a, b));
+}
+
+/// Over what lengths rounding, and residuals, must not decide, m.
+static double least_blend(const bt_world *w) { return bt_max(w->par.slop, LEAST_BLEND * w->par.size); }
+
 // --- memory ----------------------------------------------------------------------------------------------------------
 
 static bool keeps(const bt_world *w, bt_memory *r)
@@ -160,8 +170,8 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     double grad[2], turn, centroid[2], off[2];
     bt_overlap_clip(w, p->a, p->b, p->part, 0, 0, &o);
     bt_overlap_area(&o, centroid);
-    const double blend = bt_max(w->par.slop, LEAST_BLEND * w->par.size); // rounding must not tell which edge is inside
-    bt_overlap_gradient(w, p->a, p->b, p->part, &o, blend, grad, &turn);
+    // rounding must not tell which edge is inside
+    bt_overlap_gradient(w, p->a, p->b, p->part, &o, least_blend(w), grad, &turn);
     bt_bodies_offset(w, p->a, p->b, off);
     *edge = (bt_manifold){.a = p->a, .b = p->b};
     *sheets = (bt_manifold){.a = p->a, .b = p->b, .nx = 1};
@@ -189,11 +199,46 @@ static bt_patch flush_part(const bt_manifold *m)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
+/// Part of the losses that an edge bears: of the way that it would make in the step by the velocities without contacts
+/// what is left beyond the gap, with a slop on both.
+static double reached(const bt_world *w, const bt_contact *edge, double gap)
+{
+    const bt_bodies *s = &w->bodies;
+    const double before = bt_mean_normal_velocity(edge, &s->vel_start[edge->a], &s->vel_start[edge->b]),
+                 free = bt_mean_normal_velocity(edge, &s->vel_free[edge->a], &s->vel_free[edge->b]);
+    const double way = w->par.dt * bt_max(0, -bt_min(before, free));
+    return bt_max(0, 1 - gap / (way + least_blend(w)));
+}
+
+/// Leaves an edge the stored part of its bound. Returns the rest, R of raft.h, N s.
+static double take_losses(const bt_world *w, bt_cell *t, bt_idx edge)
+{
+    const bt_contact *u = &t->contacts[edge];
+    bt_limit *l = &t->laws.limits[edge];
+    const double length = bt_max(2 * fabs(u->ran[1] - u->ran[0]), thinner(&w->bodies, u->a, u->b));
+    const double part = 0.5 * stored_load(w, u->a, u->b) * length * w->par.dt;
+    double losses = 0;
+    for (int i = 0; i < u->n; i++) {
+        losses += bt_max(0, l->flat[i] - part);
+        l->flat[i] = bt_min(l->flat[i], part);
+        l->most[i] = bt_min(l->most[i], part);
+        l->cap[i] = bt_min(l->cap[i], part);
+    }
+    return losses * reached(w, u, t->gaps[edge].gap[0]);
+}
+
+/// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
+static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, const bt_memory *r)
 {
     bt_contact *u = &t->contacts[j];
+    bt_limit *l = &t->laws.limits[j];
     const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
-    t->laws.limits[j].flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
+    l->flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
+    if (edge >= 0) {
+        const double half = 0.5 * take_losses(w, t, edge);
+        l->flat[0] += half;
+        l->centre[0] = half * t->contacts[edge].nx, l->centre[1] = half * t->contacts[edge].ny;
+    }
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
@@ -204,9 +249,10 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     const bt_idx at = bt_law_find(t, &names);
     l->record[BT_LAW_RAFTING] = (int32_t)at;
     if (m->n_points == 0) {
-        bound_sheets(w, t, j, &t->laws.memory[at]);
+        bound_sheets(w, t, j, p->contact, &t->laws.memory[at]);
         return;
     }
+    if (at >= 0) t->contacts[j].mu = 0; // what acts along the edge is in the contact of the sheets
     const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
     const bt_closing c = bt_law_closing(w, t, j, m);
     const bt_patch edge = at >= 0 ? chord_of(m) : flush_part(m);
@@ -214,6 +260,17 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
         const double length = edge.length * bt_law_share(m, i, edge, &c);
         bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
     }
+}
+
+double bt_raft_pressing(const bt_cell *t, bt_idx j)
+{
+    const bt_contact *u = &t->contacts[j];
+    if (u->n > 0) return u->ln[0] + u->ln[1];
+    const bt_idx edge = t->search.pairs[u->pair].contact;
+    if (edge < 0) return 0;
+    const bt_contact *e = &t->contacts[edge];
+    const double *c = t->laws.limits[j].centre, most = 2 * bt_hypot(c[0], c[1]);
+    return e->ln[0] + e->ln[1] + bt_max(0, bt_min(most, u->ln[0] * e->nx + u->lt * e->ny));
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------
@@ -228,6 +285,15 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
     bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
 }
 
+/// Part of the work of sheets that is losses of their edge: of D of raft.h at the velocities of the step.
+static double losses_of(const bt_world *w, const bt_contact *u, const bt_limit *l)
+{
+    const bt_vel *a = &w->bodies.vel[u->a], *b = &w->bodies.vel[u->b];
+    const double x = bt_normal_velocity(u, 0, a, b), y = bt_tangent_velocity(u, a, b), speed = bt_hypot(x, y);
+    const double *c = l->centre, half = bt_hypot(c[0], c[1]), all = l->flat[0] * speed - c[0] * x - c[1] * y;
+    return all > 0 ? bt_max(0, 1 - (l->flat[0] - half) * speed / all) : 0;
+}
+
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
 static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
 {
@@ -237,7 +303,9 @@ static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     if (u->n == 0) {
         t->laws.memory[at].value[2] = u->ln[0];
         t->laws.memory[at].value[3] = u->lt;
-        bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(w, u));
+        const double work = -bt_contacts_work(w, u), part = losses_of(w, u, l);
+        bt_sum_add(&number[EDGE_WORK], part * work);
+        bt_sum_add(&number[FRICTION_WORK], (1 - part) * work);
         return;
     }
     bool begins = false;

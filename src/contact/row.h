@@ -12,6 +12,12 @@ static inline double bt_normal_velocity(const bt_contact *u, int i, const bt_vel
     return u->nx * (vb->x - va->x) + u->ny * (vb->y - va->y) + u->rbn[i] * vb->w - u->ran[i] * va->w;
 }
 
+/// At the middle of the two points of a contact.
+static inline double bt_mean_normal_velocity(const bt_contact *u, const bt_vel *va, const bt_vel *vb)
+{
+    return 0.5 * (bt_normal_velocity(u, 0, va, vb) + bt_normal_velocity(u, 1, va, vb));
+}
+
 static inline double bt_tangent_velocity(const bt_contact *u, const bt_vel *va, const bt_vel *vb)
 {
     return u->nx * (vb->y - va->y) - u->ny * (vb->x - va->x) + u->rbt * vb->w - u->rat * va->w;

@@ -4,8 +4,8 @@
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
 // share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
 // (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the
-// solution. Sheets that lie on each other (contact/raft.h) are contacts, too, whose two components are bounded by a
-// disc.
+// solution. Sheets that lie on each other (contact/raft.h) are contacts, too, whose two components lie in a disc about
+// a middle of its own.
 #include "output/dump.h"
 
 #include <math.h>
@@ -28,7 +28,7 @@ typedef struct {
     bt_gid gid_a, gid_b;
     int point;
     bt_idx a, b;
-    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound, disc;
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound, disc, centre[2];
 } row;
 
 static int by_gids(const void *p, const void *q)
@@ -55,6 +55,7 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
 static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
 {
     const bt_contact *u = &t->contacts[j];
+    const bt_limit *l = &t->laws.limits[j];
     return (row){.gid_a = w->bodies.gid[u->a],
                  .gid_b = w->bodies.gid[u->b],
                  .point = 2,
@@ -69,7 +70,8 @@ static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
                  .ln = u->ln[0],
                  .lt = u->lt,
                  .bound = INFINITY,
-                 .disc = t->laws.limits[j].flat[0]};
+                 .disc = l->flat[0],
+                 .centre = {l->centre[0], l->centre[1]}};
 }
 
 /// Normal and tangential row of every contact point, in the order of the gids.
@@ -175,7 +177,7 @@ static incidence *incidences_of(const bt_bodies *b, const row *rows, int n, int6
 typedef struct {
     int64_t *ptr;
     int32_t *col;
-    double *val, *q, *mu, *u, *r, *bound, *disc;
+    double *val, *q, *mu, *u, *r, *bound, *disc, *centre;
 } problem;
 
 /// most: blocks of W, at most.
@@ -186,8 +188,9 @@ static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t mo
     x.ptr = bt_alloc(2 * m + 1, sizeof *x.ptr);
     x.col = bt_alloc(4 * (size_t)most, sizeof *x.col);
     x.val = bt_alloc(4 * (size_t)most, sizeof *x.val);
-    double **const two[] = {&x.q, &x.u, &x.r}, **const one[] = {&x.mu, &x.bound, &x.disc};
-    for (int i = 0; i < 3; i++) *two[i] = bt_alloc(2 * m, sizeof(double)), *one[i] = bt_alloc(m, sizeof(double));
+    double **const two[] = {&x.q, &x.u, &x.r, &x.centre}, **const one[] = {&x.mu, &x.bound, &x.disc};
+    for (int i = 0; i < 4; i++) *two[i] = bt_alloc(2 * m, sizeof(double));
+    for (int i = 0; i < 3; i++) *one[i] = bt_alloc(m, sizeof(double));
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
         const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
@@ -199,6 +202,7 @@ static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t mo
         x.mu[k] = p->mu;
         x.bound[k] = p->bound;
         x.disc[k] = p->disc;
+        x.centre[2 * k] = p->centre[0], x.centre[2 * k + 1] = p->centre[1];
     }
     return x;
 }
@@ -255,13 +259,14 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         x.q[i] = x.u[i] - wr;
     }
     const bt_fclib_places places = places_of(w, rows, n);
+    const bool rafts = bt_law_on(&w->par, BT_LAW_RAFTING);
     const bt_fclib_problem out = {
         .n = n, .w_ptr = x.ptr, .w_col = x.col, .w_val = x.val, .q = x.q, .mu = x.mu, .u = x.u, .r = x.r,
-        .bound = bt_laws_on(&w->par) ? x.bound : NULL, .disc = bt_law_on(&w->par, BT_LAW_RAFTING) ? x.disc : NULL,
-        .places = &places, .title = "bergtow",
+        .bound = bt_laws_on(&w->par) ? x.bound : NULL, .disc = rafts ? x.disc : NULL,
+        .centre = rafts ? x.centre : NULL, .places = &places, .title = "bergtow",
         .description = "contact problem of one time step of broken sea ice, 2-D, with its solution"};
     const bt_status status = bt_fclib_write(path, &out, err);
-    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc,
+    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc, x.centre,
                             (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;

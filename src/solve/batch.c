@@ -168,15 +168,17 @@ static void put_projection(bt_batch *o, const bt_cell *cell, const bt_unknowns *
 }
 
 /// Masses of sheets one by one: they have a root.
-BT_INLINE void put_sheets(bt_batch *o, const bt_contact *const u[BT_LANES], const bt_inv *inv)
+BT_INLINE void put_sheets(bt_batch *o, const bt_contact *const u[BT_LANES], const bt_limit *limits, const bt_inv *inv)
 {
     for (int l = 0; l < o->n; l++) {
         const bt_mass m = bt_mass_of(u[l], inv);
         o->w[0][l] = m.w[0], o->mn[0][l] = m.mn[0], o->wt[l] = m.wt, o->mt[l] = m.mt;
+        o->BT_CENTRE_X[l] = limits[o->contact[l]].centre[0], o->BT_CENTRE_Y[l] = limits[o->contact[l]].centre[1];
     }
 }
 
-BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const place *p, const bt_unknowns *of, const bt_inv *inv)
+BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const bt_limit *limits, const place *p,
+                   const bt_unknowns *of, const bt_inv *inv)
 {
     static const bt_contact nothing;
     static const bt_unknowns nowhere;
@@ -207,7 +209,7 @@ BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const place *p, cons
     o->x[2] = r.lt;
     for (int c = 0; c < 3; c++)
         o->before[c] = (bt_vec){x[0]->before[c], x[1]->before[c], x[2]->before[c], x[3]->before[c]};
-    if (p->kind == BT_BATCH_SHEETS) put_sheets(o, u, inv);
+    if (p->kind == BT_BATCH_SHEETS) put_sheets(o, u, limits, inv);
 }
 
 /// n records, of which none lies in the other place; a call of the library takes longer for so few.
@@ -228,7 +230,7 @@ static void put_all(bt_cell *cell, const packing *s, const bt_inv *inv, const do
 {
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
         bt_batch *o = &cell->work.batch[k];
-        put(o, s->u, &s->place[k], s->of, inv);
+        put(o, s->u, cell->laws.limits, &s->place[k], s->of, inv);
         if (slop) put_projection(o, cell, s->of, *slop);
         if (!cell->laws.limits) continue;
         bt_batch_bounds *at = &bounds_of(cell)[k];

@@ -93,11 +93,11 @@ BT_INLINE vec update_sheets(bt_batch *o, vec disc, bt_vel *v)
     const vec dvx = b.x - a.x, dvy = b.y - a.y;
     vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
     vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
-    const vec square = x * x + y * y, one = {1, 1, 1, 1};
+    const vec out_x = x - o->BT_CENTRE_X, out_y = y - o->BT_CENTRE_Y, square = out_x * out_x + out_y * out_y;
     for (int l = 0; l < BT_LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
-    const vec scale = bt_choose(far > disc, disc / far, one);
-    x *= scale;
-    y *= scale;
+    const mask outside = far > disc;
+    x = bt_choose(outside, o->BT_CENTRE_X + out_x * (disc / far), x);
+    y = bt_choose(outside, o->BT_CENTRE_Y + out_y * (disc / far), y);
     const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
     a.x -= o->ma * jx;
     a.y -= o->ma * jy;

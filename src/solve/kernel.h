@@ -49,21 +49,23 @@ static inline double bt_take_normals(bt_contact *u, const bt_mass *m, double l1,
     return bt_max(bt_max(fabs(d1) * m->w[0], fabs(d2) * m->w[1]), fabs(dt) * m->wt);
 }
 
-/// The nearest point of a disc about 0.
-static inline void bt_onto_disc(double radius, double *x, double *y)
+/// The nearest point of the disc of sheets (contact/raft.h).
+static inline void bt_onto_disc(const bt_limit *k, double *x, double *y)
 {
-    const double far = sqrt(*x * *x + *y * *y), scale = far > radius ? radius / far : 1;
-    *x *= scale;
-    *y *= scale;
+    const double dx = *x - k->centre[0], dy = *y - k->centre[1];
+    const double far = sqrt(dx * dx + dy * dy), radius = k->flat[0];
+    if (!(far > radius)) return;
+    *x = k->centre[0] + dx * (radius / far);
+    *y = k->centre[1] + dy * (radius / far);
 }
 
-/// What the friction of sheets would be after a step of its own (contact/raft.h).
+/// What the load of sheets would be after a step of its own (contact/raft.h).
 static inline void bt_sheets_map(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *va,
                                  const bt_vel *vb, double *x, double *y)
 {
     *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * m->mn[0];
     *y = u->lt - bt_tangent_velocity(u, va, vb) * m->mt;
-    bt_onto_disc(k->flat[0], x, y);
+    bt_onto_disc(k, x, y);
 }
 
 static inline double bt_update_sheets(bt_contact *u, const bt_mass *m, const bt_limit *k, bt_vel *v, const bt_inv *inv)
@@ -117,10 +119,10 @@ static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, c
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double x, y;
     bt_sheets_map(u, m, k, va, vb, &x, &y);
-    const double size = sqrt(x * x + y * y), dx = x - u->ln[0], dy = y - u->lt;
+    const double radius = k->flat[0], dx = x - u->ln[0], dy = y - u->lt;
     const double slip = bt_max(fabs(bt_normal_velocity(u, 0, va, vb)), fabs(bt_tangent_velocity(u, va, vb)));
     x = dx * m->wt, y = dy * m->wt;
-    const double lacks = size > 0 ? bt_short_residual(slip, sqrt(dx * dx + dy * dy) / size, tolerance) : 0;
+    const double lacks = radius > 0 ? bt_short_residual(slip, sqrt(dx * dx + dy * dy) / radius, tolerance) : 0;
     *sum += bt_max(x * x + y * y, lacks * lacks);
     return isfinite(x + y) ? bt_max(bt_max(fabs(x), fabs(y)), lacks) : INFINITY;
 }

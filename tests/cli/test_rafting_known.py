@@ -12,10 +12,15 @@ with the area a s over other ice, (2/κ) q0 a s of potential energy, q0 a s of w
 Red when the bound of one contact is taken twice, friction of the sheets is of all rows at once, body or wall raft, or
 a number of the summary is of another kind.
 """
+import sys
+
 import numpy as np
 import pytest
 
-from harness import run
+from harness import ROOT, run
+
+sys.path.insert(0, str(ROOT / "postproc"))
+import plot_chains  # noqa: E402
 
 A, H, MU, KAPPA, V, DT = 2.0, 0.2, 0.3, 8, 0.01, 0.1
 RHO_W, RHO_I, G = 1000.0, 920.0, 9.81
@@ -23,7 +28,7 @@ Q0 = 0.5 * KAPPA * RHO_I * (1 - RHO_I / RHO_W) * G * H**2
 SHEETS = MU * (RHO_W - RHO_I) * G * H * A  # N for a metre of overlap
 
 
-def pushed(tmp_path, n, s, slop=1e-3):
+def pushed(tmp_path, n, s, *more, slop=1e-3):
     """n floes that touch, between the body and the end wall, shortened by s."""
     body, slack = 1.0, 1e-3
     length = 1 + body + n * A + slack
@@ -39,19 +44,32 @@ def pushed(tmp_path, n, s, slop=1e-3):
         "water": {"density": RHO_W},
         "output": {"window_start": 0, "frame_interval": s / V},
         "solver": {"tolerance": 1e-7, "max_sweeps": 20000, "slop": slop},
-    })
+    }, *more)
     assert r.summary["unconverged_steps"] == 0
     return r, slack
 
 
 def test_edges_that_lie_on_each_other_bear_load_without_slop(tmp_path):
-    """The sides of the two are in one line, and inside or outside of each other by rounding alone. (They then give way
-    to the sides, as far as the channel lets them, and rub along it.)"""
+    """The sides of the two are in one line, and inside or outside of each other by rounding alone. They then give way
+    to the sides, as far as the channel lets them, and go on at the angle tan α = d/a to the gradient of their area, at
+    which the losses are (1 + cos α)/(2 cos α) times those in line."""
     r, slack = pushed(tmp_path, 2, 1.0, slop=0)
     area = A * (1.0 - slack)
     assert r.summary["rafted_area_m2"] == pytest.approx(area, rel=0.005)
-    assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area, rel=0.005)
+    x = (1.0 - slack) / A
+    aside = (x + 0.5 * (x * np.sqrt(1 + x**2) + np.arcsinh(x))) / 2 / x  # mean of (1 + 1/cos α)/2
+    assert aside > 1.015
+    assert r.summary["raft_edge_work_j"] == pytest.approx(Q0 * area * (2 / KAPPA + (1 - 2 / KAPPA) * aside), rel=0.002)
     assert r.summary["raft_friction_work_j"] == pytest.approx(0.5 * SHEETS, rel=0.03)
+
+
+def test_force_chains_have_what_edges_bear(tmp_path):
+    """Stored part and losses between the two floes, without the friction of the sheets."""
+    pushed(tmp_path, 2, 0.3, "--dump-contacts", f"250:{tmp_path / 'c.h5'}")
+    c = plot_chains.read(tmp_path / "c.h5")
+    between = np.all(c.body < 2, axis=1)
+    assert between.sum() == 3  # two points of the edge, and the sheets
+    assert (c.force * np.abs(c.normal[:, 0]))[between].sum() == pytest.approx(Q0 * A, rel=2e-3)
 
 
 @pytest.mark.parametrize("n, s", [(2, 1.0), (3, 1.5), (5, 1.2)])

@@ -3,10 +3,11 @@
 
     u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound
     |r_t| <= μ r_n against u_t
-    sheets on each other: |(r_x, r_y)| <= R against (u_x, u_y)
+    sheets on each other: (r_x, r_y) = c + d, |d| <= R, d against (u_x, u_y)
 
 For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of
-such problems. Then the rows that hold, and those that give way, are known, and what is left is a system of equations,
+such problems. Floes that have rafted have no friction bound: without walls a problem of them alone is convex as it
+stands. Then the rows that hold, and those that give way, are known, and what is left is a system of equations,
 solved by Newton's method to the last digits.
 """
 import h5py
@@ -31,7 +32,7 @@ class Rafting(Problem):
     def __init__(self, path):
         super().__init__(path)
         with h5py.File(path) as f:
-            self.disc = f["disc"][:]
+            self.disc, self.centre = f["disc"][:], f["centre"][:]
         self.sheets = np.isfinite(self.disc)
 
 
@@ -93,7 +94,7 @@ def from_scratch(p):
     """Impulses of the problem, of which nothing but W, q, μ, bounds and discs is looked at; approximate."""
     scale = 1 / np.sqrt(np.diag(p.W))
     unit = SPEED * np.median(scale)
-    W, q = scale[:, None] * p.W * scale, scale * p.q / unit
+    W, q = scale[:, None] * p.W * scale, scale * (p.q + p.W @ p.centre) / unit  # of d, and of all others r
     rows = np.arange(2 * p.n).reshape(-1, 2)
     # Both rows of sheets by the same factor: a disc must stay one.
     for i, j in rows[p.sheets]:
@@ -110,7 +111,7 @@ def from_scratch(p):
         high[::2] = np.where(p.sheets, np.inf, p.bound / scale[::2] / unit)
         high[1::2] = np.where(p.sheets, np.inf, np.maximum(p.mu * normal / scale[1::2] / unit, 1e-9))
         low[1::2] = -high[1::2]
-        x = scale * unit * interior_point(W, q, low, high, discs, radius)
+        x = scale * unit * interior_point(W, q, low, high, discs, radius) + p.centre
         normal = np.where(p.sheets, 0, np.maximum(x[::2], 0))
         change = np.abs(p.W @ (x - before)).max() if np.all(np.isfinite(before)) else np.inf
         if change < 1e-7 * SPEED:
@@ -133,11 +134,11 @@ def polish(p, x):
                 if np.hypot(u[i], u[j]) < small:                                 # they stick
                     E[[i, j]], J[[i, j]] = v[[i, j]], p.W[[i, j]]
                 else:                                                            # on the rim, against the sliding
-                    w = p.W[i, i]
-                    E[i], E[j] = (r[i]**2 + r[j]**2 - p.disc[k]**2) * w / (2 * p.disc[k]), (r[i] * v[j] -
-                                                                                            r[j] * v[i]) / p.disc[k]
-                    J[i, i], J[i, j] = r[i] * w / p.disc[k], r[j] * w / p.disc[k]
-                    J[j] = (r[i] * p.W[j] - r[j] * p.W[i]) / p.disc[k]
+                    w, (dx, dy) = p.W[i, i], r[[i, j]] - p.centre[[i, j]]
+                    E[i] = (dx**2 + dy**2 - p.disc[k]**2) * w / (2 * p.disc[k])
+                    E[j] = (dx * v[j] - dy * v[i]) / p.disc[k]
+                    J[i, i], J[i, j] = dx * w / p.disc[k], dy * w / p.disc[k]
+                    J[j] = (dx * p.W[j] - dy * p.W[i]) / p.disc[k]
                     J[j, i] += v[j] / p.disc[k]
                     J[j, j] -= v[i] / p.disc[k]
                 continue
@@ -168,11 +169,14 @@ def test_impulses_of_a_cluster(tmp_path, seed):
     p = dump(tmp_path, seed)
     # The law, row by row.
     rows = np.arange(2 * p.n).reshape(-1, 2)
-    size, slide = np.hypot(*p.r[rows[p.sheets]].T), np.hypot(*p.u[rows[p.sheets]].T)
+    d = p.r - p.centre
+    size, slide = np.hypot(*d[rows[p.sheets]].T), np.hypot(*p.u[rows[p.sheets]].T)
+    middle = np.hypot(*p.centre[rows[p.sheets]].T)
+    assert np.sum(middle > 1e-3 * p.disc[p.sheets]) >= 2 and np.all(middle < p.disc[p.sheets] * (1 + 1e-12))
     assert p.sheets.sum() >= 3 and np.all(size <= p.disc[p.sheets] * (1 + 1e-12))
     slides = slide > 1e-6 * SPEED
     np.testing.assert_allclose(size[slides], p.disc[p.sheets][slides], rtol=1e-6)
-    assert np.all((p.r[rows[p.sheets]] * p.u[rows[p.sheets]]).sum(axis=1)[slides] < -(1 - 1e-6) *
+    assert np.all((d[rows[p.sheets]] * p.u[rows[p.sheets]]).sum(axis=1)[slides] < -(1 - 1e-6) *
                   (size * slide)[slides])
     at_bound = (p.u[::2] < -1e-6 * SPEED) & ~p.sheets
     np.testing.assert_allclose(p.r[::2][at_bound], p.bound[at_bound], rtol=1e-6)

@@ -74,6 +74,8 @@ static void bind(knot_of_floes *s, uint64_t *rng)
         if (scene_uniform(rng) < 0.35) {
             make_sheets(&s->contacts[i], rng);
             l->flat[0] = scene_uniform(rng) < 0.1 ? 0 : scene_uniform(rng);
+            if (scene_uniform(rng) < 0.7) // nearly all lie about another point than 0
+                for (int c = 0; c < 2; c++) l->centre[c] = 0.6 * any(rng);
         } else if (scene_uniform(rng) < 0.8) {
             for (int c = 0; c < s->contacts[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
         }
