@@ -162,6 +162,7 @@ typedef struct bt_params {
     double draft;          ///< of ice / its thickness, ρ_i/ρ_w
     double lee_reach;      ///< farthest that any floe shelters, m
     bool covers;           ///< sheets that lie on each other share their skin drag
+    double exposure_slow;  ///< floes past which fluids flow slower, m/s, are looked at less often
     int64_t exposure_steps; ///< steps from one look at it to the next, 0 = never: all bodies have all of their drag
 } bt_params;
 

@@ -6,12 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/ascending.h"
 #include "base/elementary.h"
 #include "body/bodies.h"
 #include "partition/domain.h"
 #include "space/cells.h"
 #include "space/phases.h"
+
+enum { SLOW = 8 }; // looks to one at a floe past which nothing flows fast, assumed
 
 #define TAPER 3.5 // x at which the lee begins to end, assumed
 
@@ -32,6 +33,8 @@ typedef struct scratch {
     size_t n, cap;
     double *number;
     size_t n_numbers, cap_numbers;
+    struct quarter *quarter;
+    size_t cap_quarters;
 } scratch;
 
 /// A copy of a floe, by its cell.
@@ -47,8 +50,8 @@ typedef struct surroundings {
     placed *sorted;   ///< [copies.n] by cell
 } surroundings;
 
-/// λH/h of the fluid with the higher edges.
-static double lee_of(const bt_params *p) { return p->lee * bt_max(p->draft, 1 - p->draft); }
+/// Farthest that ice shelters / its thickness, of the fluid with the higher edges.
+static double lee_reach(const bt_params *p) { return BT_EXPOSURE_REACH * p->lee * bt_max(p->draft, 1 - p->draft); }
 
 // --- form drag -------------------------------------------------------------------------------------------------------
 
@@ -81,13 +84,17 @@ static void turn(const double along[2], double dx, double dy, int n, const doubl
 /// Where the lines enter and leave a convex polygon that has been turned; INFINITY, −INFINITY of those that pass it by.
 static void cross(const lines *l, int n, const double *v, double in[LINES], double out[LINES])
 {
+    const double per_step = 1 / l->step;
     for (int k = 0; k < LINES; k++) in[k] = INFINITY, out[k] = -INFINITY;
     for (int e = 0; e < n; e++) {
         const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
         if (p[1] == q[1]) continue;
         const double low = bt_min(p[1], q[1]), high = bt_max(p[1], q[1]), slope = (q[0] - p[0]) / (q[1] - p[1]);
-        const int first = (int)bt_max(0, bt_min(LINES, ceil((low - l->from) / l->step - 0.5)));
-        for (int k = first; k < LINES; k++) {
+        const double place = (low - l->from) * per_step - 0.5;
+        if (place > LINES - 1) continue;
+        int k = place > 0 ? (int)place : 0;
+        if (k < place) k++;
+        for (; k < LINES; k++) {
             const double at = l->from + (k + 0.5) * l->step;
             if (at > high) break;
             const double s = p[0] + (at - p[1]) * slope;
@@ -125,7 +132,7 @@ static void cast(const bt_params *p, const lines *l, const neighbour *j, double 
                  double shelter[][LINES])
 {
     const bt_bodies *b = j->b;
-    const double r = b->radius[j->i], h = b->thickness[j->i], reach = BT_EXPOSURE_REACH * lee_of(p) * h;
+    const double r = b->radius[j->i], h = b->thickness[j->i], reach = lee_reach(p) * h;
     const double s = l->along[0] * j->dx + l->along[1] * j->dy, t = l->along[0] * j->dy - l->along[1] * j->dx;
     if (s - r >= l->last || l->first - s - r >= reach || t - r >= l->from + LINES * l->step || t + r <= l->from) return;
     for (int part = bt_part_first(b, j->i); part >= 0; part = bt_part_next(b, j->i, part)) {
@@ -145,12 +152,12 @@ static void cast(const bt_params *p, const lines *l, const neighbour *j, double 
 }
 
 /// Factors of n fluids that flow past floe i with the same velocity.
-static void edges(const bt_world *w, bt_idx i, double vx, double vy, const scratch *s, int n, const double *scale,
+static void edges(const bt_world *w, bt_idx i, const double v[2], const scratch *s, int n, const double *scale,
                   double factor[])
 {
     lines l;
     double shelter[2][LINES] = {{0}};
-    draw(&w->bodies, i, vx, vy, &l);
+    draw(&w->bodies, i, v[0], v[1], &l);
     for (size_t k = 0; k < s->n; k++) cast(&w->par, &l, &s->near[k], w->bodies.thickness[i], n, scale, shelter);
     for (int f = 0; f < n; f++) {
         double sum = 0;
@@ -160,6 +167,45 @@ static void edges(const bt_world *w, bt_idx i, double vx, double vy, const scrat
 }
 
 // --- skin drag -------------------------------------------------------------------------------------------------------
+
+static int outline_of(const neighbour *j, const double **v)
+{
+    *v = j->b->outline + 2 * j->b->offset[j->i];
+    return bt_body_corners(j->b, j->i);
+}
+
+/// Area that two convex outlines share, m²: what is left of b between the edges of a, one after the other.
+static double shared(const neighbour *a, const neighbour *b)
+{
+    const double *v, *u, dx = b->dx - a->dx, dy = b->dy - a->dy;
+    const int n = outline_of(a, &v);
+    int m = outline_of(b, &u);
+    double left[2][4 * BT_MAX_VERTICES];
+    for (int k = 0; k < m; k++) left[0][2 * k] = u[2 * k] + dx, left[0][2 * k + 1] = u[2 * k + 1] + dy;
+    for (int e = 0; e < n; e++) {
+        const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0), *from = left[e & 1], *last = from + 2 * (m - 1);
+        const double ex = q[0] - p[0], ey = q[1] - p[1];
+        double *to = left[1 - (e & 1)], before = m > 0 ? ex * (last[1] - p[1]) - ey * (last[0] - p[0]) : 0;
+        int kept = 0;
+        for (int k = 0; k < m; last = from + 2 * k++) {
+            const double *at = from + 2 * k, inside = ex * (at[1] - p[1]) - ey * (at[0] - p[0]);
+            if ((inside >= 0) != (before >= 0)) {
+                const double f = before / (before - inside);
+                to[2 * kept] = last[0] + f * (at[0] - last[0]);
+                to[2 * kept++ + 1] = last[1] + f * (at[1] - last[1]);
+            }
+            if (inside >= 0) to[2 * kept] = at[0], to[2 * kept++ + 1] = at[1];
+            before = inside;
+        }
+        m = kept;
+    }
+    const double *v_left = left[n & 1];
+    double twice = 0;
+    for (int k = 1; k + 1 < m; k++)
+        twice += (v_left[2 * k] - v_left[0]) * (v_left[2 * k + 3] - v_left[1]) -
+                 (v_left[2 * k + 1] - v_left[1]) * (v_left[2 * k + 2] - v_left[0]);
+    return bt_max(0, 0.5 * twice);
+}
 
 /// Do two convex outlines overlap by more than `slop`, m, along every edge normal? Those of the first: with edges of the
 /// other it is asked again, the other way round.
@@ -178,6 +224,17 @@ static bool within(const bt_bodies *a, bt_idx i, const bt_bodies *b, bt_idx j, d
     return true;
 }
 
+/// By insertion: there are few, and most lists are nearly in order.
+static void sort(double *x, size_t n)
+{
+    for (size_t j = 1; j < n; j++) {
+        const double at = x[j];
+        size_t k = j;
+        for (; k > 0 && x[k - 1] > at; k--) x[k] = x[k - 1];
+        x[k] = at;
+    }
+}
+
 static void put(scratch *s, double x)
 {
     if (s->n_numbers == s->cap_numbers) {
@@ -185,12 +242,6 @@ static void put(scratch *s, double x)
         s->number = bt_realloc(s->number, s->cap_numbers, sizeof *s->number);
     }
     s->number[s->n_numbers++] = x;
-}
-
-static int outline_of(const neighbour *j, const double **v)
-{
-    *v = j->b->outline + 2 * j->b->offset[j->i];
-    return bt_body_corners(j->b, j->i);
 }
 
 /// Ordinates at which edges of two outlines cross.
@@ -240,8 +291,8 @@ static double seen_on(const neighbour *sheet, size_t m, double y, double *end, d
         of[0] = bt_max(of[0], x[0]), of[1] = bt_min(of[1], x[1]);
         if (of[0] < of[1]) end[n] = of[0], end[m + n] = of[1], n++;
     }
-    qsort(end, n, sizeof *end, bt_ascending);
-    qsort(end + m, n, sizeof *end, bt_ascending);
+    sort(end, n);
+    sort(end + m, n);
     double sum = 0, at = x[0];
     for (size_t begun = 0, ended = 0; ended < n;) {
         const bool begins = begun < n && end[begun] < end[m + ended];
@@ -265,7 +316,7 @@ static double seen(const neighbour *sheet, size_t m, scratch *s)
         for (size_t j = 0; j < k; j++) add_crossings(&sheet[j], &sheet[k], s);
     }
     const size_t n = s->n_numbers;
-    qsort(s->number, n, sizeof *s->number, bt_ascending);
+    sort(s->number, n);
     for (size_t k = 0; k < 2 * m; k++) put(s, 0);
     double area = 0, sum = 0;
     for (size_t k = 0; k + 1 < n; k++) {
@@ -297,61 +348,58 @@ static double skin(const bt_world *w, bt_idx i, scratch *s)
     neighbour *sheet = bt_alloc(m + 1, sizeof *sheet);
     sheet[0] = (neighbour){b, i, 0, 0};
     memcpy(sheet + 1, s->near, m * sizeof *sheet);
-    const double e = seen(sheet, m + 1, s);
+    bool pile = false;
+    for (size_t k = 2; k <= m; k++)
+        for (size_t j = 1; j < k; j++) pile = pile || shared(&sheet[j], &sheet[k]) > 0;
+    double e = 1;
+    for (size_t k = 1; k <= m && !pile; k++) e -= 0.5 * shared(sheet, &sheet[k]) / b->area[i];
+    if (pile) e = seen(sheet, m + 1, s);
     free(sheet);
-    return e;
+    return bt_max(0, e);
 }
 
 // --- who is near -----------------------------------------------------------------------------------------------------
 
-static void consider(const bt_world *w, bt_idx i, const bt_bodies *b, bt_idx j, scratch *s)
+/// Floes of one cell, held here or copies, and the box about them from the middle of the cell that is looked at, m.
+typedef struct quarter {
+    const bt_bodies *b;
+    const placed *copy; ///< [first, end); NULL = bodies [first, end)
+    bt_idx first, end;
+    double low[2], high[2];
+} quarter;
+
+/// Where obstacles of floe i may stand: from its centroid, m.
+typedef struct region {
+    double low[2], high[2];
+} region;
+
+static bt_idx floe_of(const quarter *q, bt_idx k) { return q->copy ? q->copy[k].i : k; }
+
+static double offset(const bt_world *w, const bt_pose *p, const double from[2], int axis)
 {
-    const double h = b->thickness[j];
-    if (!(h > 0)) return; // no ice
-    const double dx = bt_nearest_image(b->pose[j].x - w->bodies.pose[i].x, w->par.period_x),
-                 dy = bt_nearest_image(b->pose[j].y - w->bodies.pose[i].y, w->par.period_y),
-                 reach = w->bodies.radius[i] + b->radius[j] + BT_EXPOSURE_REACH * lee_of(&w->par) * h;
-    if (dx * dx + dy * dy >= reach * reach || b->gid[j] == w->bodies.gid[i]) return;
+    return axis ? bt_nearest_image(p->y - from[1], w->par.period_y) : bt_nearest_image(p->x - from[0], w->par.period_x);
+}
+
+/// Does a box from low to high miss that of the region about a place?
+static bool misses(const region *r, const double at[2], const double low[2], const double high[2])
+{
+    return low[0] > at[0] + r->high[0] || high[0] < at[0] + r->low[0] || low[1] > at[1] + r->high[1] ||
+           high[1] < at[1] + r->low[1];
+}
+
+static void consider(const bt_world *w, bt_idx i, const region *r, const bt_bodies *b, bt_idx j, scratch *s)
+{
+    const double h = b->thickness[j], size = b->radius[j], reach = w->bodies.radius[i] + size + lee_reach(&w->par) * h,
+                 from[2] = {w->bodies.pose[i].x, w->bodies.pose[i].y},
+                 d[2] = {offset(w, &b->pose[j], from, 0), offset(w, &b->pose[j], from, 1)};
+    if (d[0] * d[0] + d[1] * d[1] >= reach * reach || !(h > 0) || b->gid[j] == w->bodies.gid[i]) return;
+    const double low[2] = {d[0] - size, d[1] - size}, high[2] = {d[0] + size, d[1] + size};
+    if (misses(r, (const double[]){0, 0}, low, high)) return;
     if (s->n == s->cap) {
         s->cap = s->cap ? 2 * s->cap : 32;
         s->near = bt_realloc(s->near, s->cap, sizeof *s->near);
     }
-    s->near[s->n++] = (neighbour){b, j, dx, dy};
-}
-
-/// Can a floe of cell c along one direction be near floe i? middle: of the cell, from the floe, m.
-static bool beside(const bt_world *w, bt_idx i, double middle, double side, double period)
-{
-    const bt_cells *t = w->cells;
-    return fabs(bt_nearest_image(middle, period)) <
-           0.5 * side + t->allowance + w->bodies.radius[i] + t->reach + w->par.lee_reach;
-}
-
-static int by_cell(const void *a, const void *b)
-{
-    const placed *p = a, *q = b;
-    if (p->cell[1] != q->cell[1]) return p->cell[1] < q->cell[1] ? -1 : 1;
-    return (p->cell[0] > q->cell[0]) - (p->cell[0] < q->cell[0]);
-}
-
-static void consider_cell(const bt_world *w, const surroundings *around, bt_idx i, int32_t x, int32_t y, scratch *s)
-{
-    const bt_cells *t = w->cells;
-    const bt_pose *p = &w->bodies.pose[i];
-    if (t->wrap_x) x = bt_cells_wrapped(x, t->wrap_x);
-    if (t->wrap_y) y = bt_cells_wrapped(y, t->wrap_y);
-    if (t->wrap_x != 1 && !beside(w, i, t->x0 + (x + 0.5) * t->side_x - p->x, t->side_x, w->par.period_x)) return;
-    if (t->wrap_y != 1 && !beside(w, i, t->y0 + (y + 0.5) * t->side_y - p->y, t->side_y, w->par.period_y)) return;
-    const bt_idx k = bt_cells_at(t, x, y);
-    for (bt_idx j = k < 0 ? 0 : t->cell[k].first; k >= 0 && j < t->cell[k].end; j++) consider(w, i, &w->bodies, j, s);
-    const placed at = {.cell = {x, y}}, *copy = around->sorted;
-    bt_idx low = 0, high = around->copies.n;
-    while (low < high) {
-        const bt_idx middle = low + (high - low) / 2;
-        if (by_cell(&copy[middle], &at) < 0) low = middle + 1;
-        else high = middle;
-    }
-    for (; low < around->copies.n && !by_cell(&copy[low], &at); low++) consider(w, i, &around->copies, copy[low].i, s);
+    s->near[s->n++] = (neighbour){b, j, d[0], d[1]};
 }
 
 /// Columns (or rows) of cells within so many rings of c: the first, and how many. Around a period none comes twice.
@@ -362,56 +410,156 @@ static int32_t span(int32_t c, int rings, int32_t wrap, int32_t *first)
     return wrap > 0 && n >= wrap ? wrap : n;
 }
 
-/// All floes that may shelter or cover floe i.
-static void gather(const bt_world *w, const surroundings *around, bt_idx i, scratch *s)
+static int by_cell(const void *a, const void *b)
+{
+    const placed *p = a, *q = b;
+    if (p->cell[1] != q->cell[1]) return p->cell[1] < q->cell[1] ? -1 : 1;
+    return (p->cell[0] > q->cell[0]) - (p->cell[0] < q->cell[0]);
+}
+
+/// Copies of cell (x, y): the first, and the end.
+static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx *first, bt_idx *end)
+{
+    const placed at = {.cell = {x, y}}, *copy = around->sorted;
+    bt_idx low = 0, high = around->copies.n;
+    while (low < high) {
+        const bt_idx middle = low + (high - low) / 2;
+        if (by_cell(&copy[middle], &at) < 0) low = middle + 1;
+        else high = middle;
+    }
+    for (*first = *end = low; *end < around->copies.n && !by_cell(&copy[*end], &at);) ++*end;
+}
+
+/// The quarters about cell k, of which [0, n) are returned; about its middle.
+static size_t quarters(const bt_world *w, const surroundings *around, bt_idx k, const double middle[2], scratch *s)
+{
+    const bt_cells *t = w->cells;
+    const bt_cell *cell = &t->cell[k];
+    int32_t from[2];
+    const int32_t n_x = span(cell->x, around->rings[0], t->wrap_x, &from[0]),
+                  n_y = span(cell->y, around->rings[1], t->wrap_y, &from[1]);
+    const bool round[2] = {n_x == t->wrap_x, n_y == t->wrap_y}; // no box goes all around a period
+    size_t n = 0;
+    if (s->cap_quarters < 2 * (size_t)n_x * (size_t)n_y) {
+        s->cap_quarters = 2 * (size_t)n_x * (size_t)n_y;
+        s->quarter = bt_realloc(s->quarter, s->cap_quarters, sizeof *s->quarter);
+    }
+    for (int32_t c = 0; c < n_x * n_y; c++) {
+        int32_t x = from[0] + c % n_x, y = from[1] + c / n_x;
+        if (t->wrap_x) x = bt_cells_wrapped(x, t->wrap_x);
+        if (t->wrap_y) y = bt_cells_wrapped(y, t->wrap_y);
+        const bt_idx held = bt_cells_at(t, x, y);
+        quarter q = {.b = &w->bodies};
+        if (held >= 0) q.first = t->cell[held].first, q.end = t->cell[held].end;
+        for (int copies = 0; copies < 2; copies++) {
+            if (copies) {
+                q.b = &around->copies, q.copy = around->sorted;
+                find_copies(around, x, y, &q.first, &q.end);
+            }
+            if (q.first == q.end) continue;
+            for (int axis = 0; axis < 2; axis++) q.low[axis] = INFINITY, q.high[axis] = -INFINITY;
+            for (bt_idx j = q.first; j < q.end; j++) {
+                const bt_idx i = floe_of(&q, j);
+                for (int axis = 0; axis < 2; axis++) {
+                    const double d = round[axis] ? 0 : offset(w, &q.b->pose[i], middle, axis),
+                                 size = round[axis] ? INFINITY : q.b->radius[i];
+                    q.low[axis] = bt_min(q.low[axis], d - size);
+                    q.high[axis] = bt_max(q.high[axis], d + size);
+                }
+            }
+            s->quarter[n++] = q;
+        }
+    }
+    return n;
+}
+
+/// Where fluids that flow past floe i at v may come from: the circle about it, drawn out upstream by the farthest lee.
+static region upstream(const bt_world *w, bt_idx i, const double v[2][2])
+{
+    const double r = w->bodies.radius[i];
+    region of = {{-r, -r}, {r, r}};
+    for (int f = 0; f < 2; f++)
+        for (int axis = 0; axis < 2; axis++) {
+            const double size = sqrt(v[f][0] * v[f][0] + v[f][1] * v[f][1]);
+            if (!(size > 0)) continue;
+            const double way = -w->par.lee_reach * v[f][axis] / size;
+            of.low[axis] = bt_min(of.low[axis], way - r);
+            of.high[axis] = bt_max(of.high[axis], way + r);
+        }
+    return of;
+}
+
+/// All floes that may shelter or cover floe i of a cell with n quarters about its middle.
+static void gather(const bt_world *w, const surroundings *around, bt_idx i, const double v[2][2],
+                   const double middle[2], size_t n, scratch *s)
 {
     const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
+    const region r = upstream(w, i, v);
     s->n = 0;
-    for (bt_idx j = b->large[i] ? 0 : t->n_in_cells; j < b->n; j++) consider(w, i, b, j, s);
-    for (bt_idx j = 0; b->large[i] && j < around->copies.n; j++) consider(w, i, &around->copies, j, s);
+    for (bt_idx j = b->large[i] ? 0 : t->n_in_cells; j < b->n; j++) consider(w, i, &r, b, j, s);
+    for (bt_idx j = 0; b->large[i] && j < around->copies.n; j++) consider(w, i, &r, &around->copies, j, s);
     if (b->large[i]) return;
-    int32_t x, y;
-    const int32_t n_x = span(b->cell[i][0], around->rings[0], t->wrap_x, &x),
-                  n_y = span(b->cell[i][1], around->rings[1], t->wrap_y, &y);
-    for (int32_t v = 0; v < n_y; v++)
-        for (int32_t u = 0; u < n_x; u++) consider_cell(w, around, i, x + u, y + v, s);
+    const double at[2] = {offset(w, &b->pose[i], middle, 0), offset(w, &b->pose[i], middle, 1)};
+    for (size_t k = 0; k < n; k++) {
+        const quarter *q = &s->quarter[k];
+        if (misses(&r, at, q->low, q->high)) continue;
+        for (bt_idx j = q->first; j < q->end; j++) consider(w, i, &r, q->b, floe_of(q, j), s);
+    }
 }
 
 // --- floe by floe ----------------------------------------------------------------------------------------------------
 
-static void look_at(bt_world *w, const surroundings *around, bt_idx i, scratch *s)
+static void look_at(bt_world *w, const bt_idx i, const double v[2][2], scratch *s)
 {
     const bt_params *p = &w->par;
     bt_bodies *b = &w->bodies;
-    const bt_vel u = b->vel[i];
-    const double water[2] = {p->water_u - u.x, p->water_v - u.y}, air[2] = {p->air_u - u.x, p->air_v - u.y};
-    const bool in_water = water[0] != 0 || water[1] != 0, in_air = air[0] != 0 || air[1] != 0;
-    if (b->motion[i] != BT_DYNAMIC || !(b->thickness[i] > 0) || (!in_water && !in_air)) return;
-    gather(w, around, i, s);
     bt_exposure *e = &b->exposure[i];
     const double scale[2] = {p->draft, 1 - p->draft};
     double factor[2];
-    if (p->lee > 0 && water[0] == air[0] && water[1] == air[1]) {
-        edges(w, i, water[0], water[1], s, 2, scale, factor);
+    if (p->lee > 0 && v[0][0] == v[1][0] && v[0][1] == v[1][1]) {
+        edges(w, i, v[0], s, 2, scale, factor);
         e->water_form = factor[0], e->air_form = factor[1];
     } else if (p->lee > 0) {
-        if (in_water) edges(w, i, water[0], water[1], s, 1, scale, &e->water_form);
-        if (in_air) edges(w, i, air[0], air[1], s, 1, scale + 1, &e->air_form);
+        if (v[0][0] != 0 || v[0][1] != 0) edges(w, i, v[0], s, 1, scale, &e->water_form);
+        if (v[1][0] != 0 || v[1][1] != 0) edges(w, i, v[1], s, 1, scale + 1, &e->air_form);
     }
     if (p->covers) e->skin = skin(w, i, s);
+}
+
+/// Velocities of water and air past floe i, m/s; false where it is not looked at now: nothing flows past it, or slowly,
+/// or it is none of this rank.
+static bool flows(const bt_world *w, bt_idx i, double v[2][2])
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_params *p = &w->par;
+    v[0][0] = p->water_u - b->vel[i].x, v[0][1] = p->water_v - b->vel[i].y;
+    v[1][0] = p->air_u - b->vel[i].x, v[1][1] = p->air_v - b->vel[i].y;
+    const double most = bt_max(v[0][0] * v[0][0] + v[0][1] * v[0][1], v[1][0] * v[1][0] + v[1][1] * v[1][1]);
+    const bool slow = most < p->exposure_slow * p->exposure_slow;
+    return b->motion[i] == BT_DYNAMIC && b->thickness[i] > 0 && bt_domain_owns(w, i) && most > 0 &&
+           !(slow && w->step / p->exposure_steps % SLOW != 0);
 }
 
 static void look_cell(bt_world *w, bt_idx k, const void *around, bt_totals *none)
 {
     (void)none;
     const bt_cells *t = w->cells;
+    const bt_cell *cell = &t->cell[k];
     if (t->asleep[k] == BT_ASLEEP) return;
+    const double middle[2] = {t->x0 + (cell->x + 0.5) * t->side_x, t->y0 + (cell->y + 0.5) * t->side_y};
     scratch s = {0};
-    for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++)
-        if (bt_domain_owns(w, i)) look_at(w, around, i, &s);
+    size_t n = 0;
+    for (bt_idx i = cell->first; i < cell->end; i++) {
+        double v[2][2];
+        if (!flows(w, i, v)) continue;
+        if (n == 0 && k < t->n - 1) n = quarters(w, around, k, middle, &s);
+        gather(w, around, i, (const double(*)[2])v, middle, n, &s);
+        look_at(w, i, (const double(*)[2])v, &s);
+    }
     free(s.near);
     free(s.number);
+    free(s.quarter);
 }
 
 /// Rings of cells that the floes near one of the middle cell stand in.
@@ -454,9 +602,10 @@ void bt_exposure_setup(bt_world *w, double speed)
         sum += b->thickness[i];
         n += b->thickness[i] > 0;
     }
-    p->lee_reach = BT_EXPOSURE_REACH * lee_of(p) * thickest;
+    p->lee_reach = lee_reach(p) * thickest;
     p->exposure_steps = 0;
     if (n == 0 || !(p->lee > 0 || p->covers)) return;
+    p->exposure_slow = BT_EXPOSURE_SLOW * speed;
     p->exposure_steps = (int64_t)bt_max(1, bt_min(1e6, round(BT_EXPOSURE_WAY * p->draft * sum / n / (speed * p->dt))));
 }
 

@@ -46,7 +46,8 @@
 
 #include "bergtow/world.h"
 
-#define BT_EXPOSURE_WAY 5.0   ///< way of the reference speed from one look to the next / draft, assumed
+#define BT_EXPOSURE_WAY 15.0  ///< way of the reference speed from one look to the next / draft, assumed
+#define BT_EXPOSURE_SLOW 0.1  ///< flow with 1 % of the drag / reference speed, assumed
 #define BT_EXPOSURE_REACH 4.5 ///< farthest that a floe shelters / λH, assumed
 
 /// How often, and how far floes look: for a world with all its floes, whose par has lee, draft and covers. speed: m/s.
