@@ -347,7 +347,12 @@ static double skin(const bt_world *w, bt_idx i, scratch *s)
     if (m == 0) return 1;
     neighbour *sheet = bt_alloc(m + 1, sizeof *sheet);
     sheet[0] = (neighbour){b, i, 0, 0};
-    memcpy(sheet + 1, s->near, m * sizeof *sheet);
+    for (size_t j = 0; j < m; j++) { // by id: rounding follows the order
+        const neighbour at = s->near[j];
+        size_t k = j + 1;
+        for (; k > 1 && sheet[k - 1].b->gid[sheet[k - 1].i] > at.b->gid[at.i]; k--) sheet[k] = sheet[k - 1];
+        sheet[k] = at;
+    }
     bool pile = false;
     for (size_t k = 2; k <= m; k++)
         for (size_t j = 1; j < k; j++) pile = pile || shared(&sheet[j], &sheet[k]) > 0;
