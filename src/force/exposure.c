@@ -16,8 +16,8 @@ enum { SLOW = 8 }; // looks to one at a floe past which nothing flows fast, assu
 
 #define TAPER 3.5 // x at which the lee begins to end, assumed
 
-/// Lines along the flow past a floe: a power of two, so that their mean is exact where all agree. 32 move a floe's
-/// factor by 0.02 rms in 80 % ice, and the mean of a field by less than 0.002.
+/// Lines along the flow past a floe: a power of two, so that their mean is exact where all agree. With 64 the factor of a
+/// floe of 30 m in 80 % ice is another by 0.02 rms, and the mean of the field 0.568 for 0.566.
 enum { LINES = 8 };
 
 /// A floe near the one that is looked at.

@@ -24,7 +24,7 @@
 // towed body itself feels the free stream.
 //
 // Skin drag. Of n sheets on a spot one is seen by the water and one by the air, and nobody knows which: each has 1/n of
-// it [A], of two one half. A floe has
+// it [A], of two one half. Between floes of one velocity that is the force on what they cover together. A floe has
 //     e = 1/A ∫_A dA/n
 // of its skin drag and of the moment of that, so that sheets that move together have the skin drag of what they cover
 // together, piles too. n is constant between edges, so that on a line y = const the integral of 1/n is linear in y from
@@ -33,10 +33,14 @@
 //
 // When. In steps n with n mod N = 0, N = max(1, τ/Δt), the factors are formed from the poses and velocities at the start
 // of the step and kept until the next such step; they are state. τ is the time in which the reference speed of the case
-// passes BT_EXPOSURE_WAY drafts of the mean floe [A]; N = 1 moves the mean resistance by no more than its error
-// (docs/theory.md). The law knows neither Δt, nor the margin of the detection, nor the age of pair lists: it looks for
-// itself, in cells within its reach. A fluid that does not flow past a floe changes nothing: the factors stay, and a
-// cell that rests costs nothing.
+// passes BT_EXPOSURE_WAY drafts of the mean floe [A], and a floe past which all flows slower than BT_EXPOSURE_SLOW of
+// that speed has its turn every eighth time [A]: its drag is 1 % and less. docs/theory.md says what the age of the
+// factors makes. The law knows neither Δt, nor the margin of the detection, nor the age of pair lists: it looks for
+// itself, in cells within its reach. A fluid that does not flow past a floe changes nothing: the factors stay (1 where
+// there never was a flow), and a cell that rests costs nothing.
+//
+// Periods. Of a floe the nearest image counts, as for contacts; a lee that goes on to a second one, or to the floe
+// itself around the period, is left out.
 //
 // Ranks. The owner of a floe forms its factors; floes near its cells that this rank does not hold come as copies for
 // the moment (partition/domain.h), and the factors go to all that hold the floe. Maxima, and sums in an order that the
