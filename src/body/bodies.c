@@ -13,10 +13,10 @@ const bt_exposure bt_exposed = {1, 1, 1};
 
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
-    FIELD(vel),       FIELD(inv),  FIELD(pose),   FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
-    FIELD(radius),    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share),     FIELD(friction), FIELD(restitution),
-    FIELD(thickness), FIELD(drag), FIELD(exposure), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(lap),
-    FIELD(home),
+    FIELD(vel),       FIELD(inv),  FIELD(pose),     FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
+    FIELD(radius),    FIELD(area), FIELD(mass),     FIELD(inertia), FIELD(share),     FIELD(friction),
+    FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(exposure), FIELD(motion), FIELD(large),
+    FIELD(disturbed), FIELD(cell), FIELD(lap),      FIELD(home),
 };
 int bt_bodies_n_fields(const bt_bodies *b)
 {

@@ -16,8 +16,8 @@ enum { SLOW = 8 }; // looks to one at a floe past which nothing flows fast, assu
 
 #define TAPER 3.5 // x at which the lee begins to end, assumed
 
-/// Lines along the flow past a floe: a power of two, so that their mean is exact where all agree. With 64 the factor of a
-/// floe of 30 m in 80 % ice is another by 0.02 rms, and the mean of the field 0.568 for 0.566.
+/// Lines along the flow past a floe: a power of two, so that their mean is exact where all agree. With 64 the factor of
+/// a floe of 30 m in 80 % ice is another by 0.02 rms, and the mean of the field 0.568 for 0.566.
 enum { LINES = 8 };
 
 /// A floe near the one that is looked at.
@@ -183,7 +183,8 @@ static double shared(const neighbour *a, const neighbour *b)
     double left[2][4 * BT_MAX_VERTICES];
     for (int k = 0; k < m; k++) left[0][2 * k] = u[2 * k] + dx, left[0][2 * k + 1] = u[2 * k + 1] + dy;
     for (int e = 0; e < n; e++) {
-        const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0), *from = left[e & 1], *last = from + 2 * (m - 1);
+        const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
+        const double *from = left[e & 1], *last = from + 2 * (m - 1);
         const double ex = q[0] - p[0], ey = q[1] - p[1];
         double *to = left[1 - (e & 1)], before = m > 0 ? ex * (last[1] - p[1]) - ey * (last[0] - p[0]) : 0;
         int kept = 0;
@@ -207,8 +208,8 @@ static double shared(const neighbour *a, const neighbour *b)
     return bt_max(0, 0.5 * twice);
 }
 
-/// Do two convex outlines overlap by more than `slop`, m, along every edge normal? Those of the first: with edges of the
-/// other it is asked again, the other way round.
+/// Do two convex outlines overlap by more than `slop`, m, along every edge normal of the first? Of the other one it is
+/// asked the other way round.
 static bool within(const bt_bodies *a, bt_idx i, const bt_bodies *b, bt_idx j, double dx, double dy, double slop)
 {
     const int n = bt_body_corners(a, i), m = bt_body_corners(b, j);

@@ -31,20 +31,20 @@
 // one vertex or crossing of outlines to the next: the middle of each such strip is exact. Counted are pairs that may
 // raft (contact/raft.h) and overlap by more than the slop.
 //
-// When. In steps n with n mod N = 0, N = max(1, τ/Δt), the factors are formed from the poses and velocities at the start
-// of the step and kept until the next such step; they are state. τ is the time in which the reference speed of the case
-// passes BT_EXPOSURE_WAY drafts of the mean floe [A], and a floe past which all flows slower than BT_EXPOSURE_SLOW of
-// that speed has its turn every eighth time [A]: its drag is 1 % and less. docs/theory.md says what the age of the
-// factors makes. The law knows neither Δt, nor the margin of the detection, nor the age of pair lists: it looks for
-// itself, in cells within its reach. A fluid that does not flow past a floe changes nothing: the factors stay (1 where
-// there never was a flow), and a cell that rests costs nothing.
+// When. In steps n with n mod N = 0, N = max(1, τ/Δt), the factors are formed from the poses and velocities at the
+// start of the step and kept until the next such step; they are state. τ is the time in which the reference speed of
+// the case passes BT_EXPOSURE_WAY drafts of the mean floe [A], and a floe past which all flows slower than
+// BT_EXPOSURE_SLOW of that speed has its turn every eighth time [A]: its drag is 1 % and less. docs/theory.md says what
+// the age of the factors makes. The law knows neither Δt, nor the margin of the detection, nor the age of pair lists:
+// it looks for itself, in cells within its reach. A fluid that does not flow past a floe changes nothing: the factors
+// stay (1 where there never was a flow), and a cell that rests costs nothing.
 //
 // Periods. Of a floe the nearest image counts, as for contacts; a lee that goes on to a second one, or to the floe
 // itself around the period, is left out.
 //
 // Ranks. The owner of a floe forms its factors; floes near its cells that this rank does not hold come as copies for
-// the moment (partition/domain.h), and the factors go to all that hold the floe. Maxima, and sums in an order that the
-// outlines give: the same bits anywhere.
+// the moment (partition/domain.h), and the factors go to all that hold the floe. Maxima, and sums in the order of ids:
+// the same bits anywhere.
 #ifndef BERGTOW_EXPOSURE_H
 #define BERGTOW_EXPOSURE_H
 

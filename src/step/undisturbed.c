@@ -77,7 +77,8 @@ void bt_undisturbed_advance(bt_world *w)
     const bt_bodies one = {
         .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
     bt_force_body mean = {
-        .drag = &v->drag, .exposure = &bt_exposed, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
+        .drag = &v->drag, .exposure = &bt_exposed, .vel = v->vel, .mass = v->mass, .inertia = v->inertia,
+        .share = v->share, .all = &one};
     const bt_vel water = {.x = w->par.water_u, .y = w->par.water_v};
     bt_vel u = v->mass > 0 ? bt_forces_drift(w, &mean) : water;
     // A law that depends on the place. The ice that a window takes in has none, and the run ends.

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What floes leave of each other's drag on any number of ranks and threads, and across stops: the same bits. Thick small
-floes, whose lee reaches over more than a cell, in wind and current, on each other, with a large floe among them.
+"""What floes leave of each other's drag on any number of ranks and threads, and across stops: the same bits.
+
+Thick small floes, whose lee reaches over more than a cell, in wind and current, on each other, a large floe among them.
 
 What turns these tests red: a floe in whose lee another stands and that its rank does not hold, factors that stay behind
-in a migration or are not in a checkpoint, a look that comes at another step after a stop, sheets in the order of memory.
+in a migration or are not in a checkpoint, a look at another step after a stop, sheets in the order of memory.
 """
 import h5py
 import numpy as np

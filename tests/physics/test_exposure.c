@@ -242,7 +242,8 @@ static bt_world *random_field(double dt, double cell)
     for (int k = 0; k < FLOES; k++) {
         double v[2 * BT_MAX_VERTICES];
         const int n = scene_random_polygon(&rng, 4, v);
-        const bt_gid g = add_sheet(w, n, v, 0.5 + scene_uniform(&rng), 140 * scene_uniform(&rng), 140 * scene_uniform(&rng));
+        const double h = 0.5 + scene_uniform(&rng), x = 140 * scene_uniform(&rng), y = 140 * scene_uniform(&rng);
+        const bt_gid g = add_sheet(w, n, v, h, x, y);
         w->bodies.vel[g] = (bt_vel){.x = scene_uniform(&rng) - 0.5, .y = scene_uniform(&rng) - 0.5};
     }
     return w;
@@ -281,7 +282,8 @@ static double plain_lee(const bt_world *w, bt_idx i)
             if (who < 0) enter = in;
             if (who < 0 || !(in < enter)) continue;
             const double x = fmax(0, enter - out) / (LAMBDA * DRAFT * h), a = x - 3.5;
-            best = fmax(best, x >= 4.5 ? 0 : fmin(1, h / b->thickness[i]) * exp(-x) * (a > 0 ? 1 - a * a * (3 - 2 * a) : 1));
+            const double left = exp(-x) * (a > 0 ? 1 - a * a * (3 - 2 * a) : 1);
+            best = fmax(best, x >= 4.5 ? 0 : fmin(1, h / b->thickness[i]) * left);
         }
         sum += best;
     }
