@@ -233,7 +233,7 @@ static void a_closed_pack_is_braked_by_its_skin(void **state)
 
 enum { FLOES = 300 };
 
-/// A loose field that drifts at random, some on others.
+/// A loose field that drifts at random, some on others; a lee may reach over two cells.
 static bt_world *random_field(double dt, double cell)
 {
     uint64_t rng = 5;
@@ -242,7 +242,7 @@ static bt_world *random_field(double dt, double cell)
     for (int k = 0; k < FLOES; k++) {
         double v[2 * BT_MAX_VERTICES];
         const int n = scene_random_polygon(&rng, 4, v);
-        const double h = 0.5 + scene_uniform(&rng), x = 140 * scene_uniform(&rng), y = 140 * scene_uniform(&rng);
+        const double h = 0.5 + 3 * scene_uniform(&rng), x = 140 * scene_uniform(&rng), y = 140 * scene_uniform(&rng);
         const bt_gid g = add_sheet(w, n, v, h, x, y);
         w->bodies.vel[g] = (bt_vel){.x = scene_uniform(&rng) - 0.5, .y = scene_uniform(&rng) - 0.5};
     }
