@@ -54,7 +54,7 @@ MUTANTS = {
         ("for (; k > 1 && sheet[k - 1].b->gid", "for (; false && sheet[k - 1].b->gid", "sheets in the order of memory"),
         ("BT_DYNAMIC && b->thickness[i] > 0 && bt_domain_owns(w, i) && most > 0 &&",
          "BT_DYNAMIC && b->thickness[i] > 0 && bt_domain_owns(w, i) &&", "a lee without a flow"),
-        ("w->par.lee_reach + 2 * t->reach + 2 * t->allowance", "w->par.lee_reach", "floes beyond the next cell"),
+        ("(w->par.lee_reach + 2 * t->reach", "(0 * t->reach", "floes beyond the next cell"),
     ]),
     "src/force/load.c": (DRAG, [
         ("0.57735026918962576451", "0.5", "Gauss points of no rule"),
