@@ -285,7 +285,8 @@ static bt_world *one_floe(const bt_case *c, double size, double thickness, doubl
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
     floe_def(c, 24, v, thickness, &d);
-    w->bodies.exposure[bt_world_add(w, &d)] = bt_exposure_estimate(&w->par, size, thickness, concentration);
+    const bt_gid g = bt_world_add(w, &d);
+    w->bodies.exposure[g] = bt_exposure_estimate(&w->par, size, thickness, concentration);
     return w;
 }
 
