@@ -88,6 +88,12 @@ void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t
 /// Collective. Largest value of every body over the ranks that hold it: x [n bodies].
 void bt_domain_largest(const bt_world *w, double *x);
 
+/// Collective. Copies of the floes that stand within so many cells along x and y of this rank's, or within `reach`, m,
+/// of a large movable floe that it owns, and that it does not hold; empty on one rank. bt_bodies_free.
+void bt_domain_around(const bt_world *w, const int rings[2], double reach, bt_bodies *copies);
+/// Collective. Values of every body, x [n bodies][width], from its owner to all ranks that hold it.
+void bt_domain_share(const bt_world *w, double *x, int width);
+
 /// Collective. Join the names of islands that meet in a body held by several ranks: name [n bodies] in and out.
 void bt_domain_join_names(const bt_world *w, bt_gid *name);
 /// Collective. Add sums of islands with the same name over the ranks.

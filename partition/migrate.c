@@ -196,6 +196,86 @@ static void move_bodies(bt_world *w)
     shrink(b);
 }
 
+// --- for the moment --------------------------------------------------------------------------------------------------
+
+/// Is floe i within `reach` of a large floe that moves?
+static bool near_large(const bt_world *w, bt_idx i, double reach)
+{
+    const bt_bodies *b = &w->bodies;
+    for (bt_idx j = w->cells->n_in_cells; j < b->n; j++) {
+        if (b->motion[j] != BT_DYNAMIC || !(b->thickness[j] > 0)) continue;
+        double d[2];
+        bt_bodies_offset(w, i, j, d);
+        const double far = b->radius[i] + b->radius[j] + reach;
+        if (d[0] * d[0] + d[1] * d[1] < far * far) return true;
+    }
+    return false;
+}
+
+void bt_domain_around(const bt_world *w, const int rings[2], double reach, bt_bodies *copies)
+{
+    *copies = (bt_bodies){.offset = bt_alloc(1, sizeof *copies->offset)};
+    if (!w->domain) return;
+    const bt_domain *d = w->domain;
+    const bt_bodies *b = &w->bodies;
+    const bt_cells *t = w->cells;
+    if (b->home) bt_bodies_make_homes(copies);
+    parcels p = new_parcels(d->comm->size);
+    uint8_t *to = bt_alloc((size_t)d->comm->size, 1);
+    for (bt_idx k = 0; k < t->n - 1; k++) {
+        const bt_cell *cell = &t->cell[k];
+        if (!cell->own || cell->first == cell->end) continue;
+        memset(to, 0, (size_t)d->comm->size);
+        for (int32_t y = -rings[1]; y <= rings[1]; y++)
+            for (int32_t x = -rings[0]; x <= rings[0]; x++) {
+                const int r = bt_division_owner(w, cell->x + x, cell->y + y);
+                if (r >= 0) to[r] = 1;
+            }
+        int holder[BT_MAX_SHARERS];
+        const int n = bt_division_sharers(w, cell->x, cell->y, holder);
+        bool held = false; // by the rank that owns the large bodies
+        for (int h = 0; h < n; h++) to[holder[h]] = 0, held = held || holder[h] == 0;
+        for (bt_idx i = cell->first; i < cell->end; i++)
+            for (int r = 0; r < d->comm->size; r++)
+                if (to[r] || (r == 0 && !held && near_large(w, i, reach))) pack(b, i, &p, r);
+    }
+    free(to);
+    size_t n_in;
+    char *in = deliver(d->comm, &p, 3, &n_in);
+    free_parcels(&p);
+    unpack(copies, in, n_in);
+    free(in);
+}
+
+void bt_domain_share(const bt_world *w, double *x, int width)
+{
+    if (!w->domain) return;
+    const bt_domain *d = w->domain;
+    const bt_bodies *b = &w->bodies;
+    const size_t bytes = (size_t)width * sizeof *x;
+    parcels p = new_parcels(d->comm->size);
+    for (bt_idx i = 0; i < b->n; i++) {
+        int rank[BT_MAX_SHARERS];
+        if (!d->owned[i]) continue;
+        const int n = b->large[i] ? d->comm->size : bt_division_sharers(w, b->cell[i][0], b->cell[i][1], rank);
+        for (int k = 0; k < n; k++) {
+            const int r = b->large[i] ? k : rank[k];
+            if (r == d->comm->rank) continue;
+            add(&p, r, &b->gid[i], sizeof *b->gid);
+            add(&p, r, x + (size_t)i * (size_t)width, bytes);
+        }
+    }
+    size_t n_in;
+    char *in = deliver(d->comm, &p, 4, &n_in);
+    free_parcels(&p);
+    for (size_t at = 0; at < n_in; at += sizeof(bt_gid) + bytes) {
+        bt_gid gid;
+        memcpy(&gid, in + at, sizeof gid);
+        memcpy(x + (size_t)bt_world_index(w, gid) * (size_t)width, in + at + sizeof gid, bytes);
+    }
+    free(in);
+}
+
 // --- contact memory --------------------------------------------------------------------------------------------------
 
 /// Rank that solves the contacts of a and b, both held here, under the new map and labels.

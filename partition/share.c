@@ -295,7 +295,8 @@ static bt_gid find_fault(const bt_world *w)
         const bt_pose *p = &b->pose[i];
         const double state[] = {
             p->x,          p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->disturbed[i],
-            b->home ? b->home[i].copy : 0, b->lap[i]};
+            b->home ? b->home[i].copy : 0, b->lap[i], b->exposure[i].skin, b->exposure[i].water_form,
+            b->exposure[i].air_form};
         uint64_t h = 0;
         for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
             uint64_t u;

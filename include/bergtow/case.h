@@ -120,6 +120,7 @@ typedef struct bt_case {
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;
+        double sheltering;              ///< λ, length of the lee of an edge / its height; 0 = none
         bt_start start;                 ///< velocity at time zero
         int64_t seed;
         double shake;                   ///< relaxation length of the generator, in mean free gaps (0 = none)

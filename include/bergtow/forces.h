@@ -113,6 +113,7 @@ typedef struct bt_force_body {
     const double *own;         ///< [BT_MAX_FORCE_OWN] numbers of the law
     const void *context;       ///< of the law
     const bt_drag *drag;
+    const bt_exposure *exposure; ///< what of it the neighbours leave
     bt_vel vel;                ///< U1, m/s, rad/s
     double time;               ///< of the middle of the step, s
     double mass, inertia;      ///< M kg, I kg m²

@@ -53,6 +53,13 @@ typedef struct bt_drag {
     double tangential;  ///< share τ of the flow along a side in the moment of form drag (forces.h)
 } bt_drag;
 
+/// What of a floe's drag its neighbours leave (src/force/exposure.h), each from 0 to 1 = all of it.
+typedef struct bt_exposure {
+    double skin;        ///< share of its area that water and air see
+    double water_form;  ///< of the form drag along its edges, in the water
+    double air_form;    ///< the same in the air
+} bt_exposure;
+
 /// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its
 /// own: contacts are found between parts, and act on the body. Rejected: parts as bodies that follow a parent.
 /// Everything that counts, sorts, moves, hashes or writes bodies would have to tell the two apart; this way only the
@@ -105,6 +112,7 @@ typedef struct bt_bodies {
     double *friction, *restitution; ///< [n]
     double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
+    bt_exposure *exposure; ///< [n] state: as it was last looked at
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no cell
     /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set
@@ -150,6 +158,13 @@ typedef struct bt_params {
     double balance_u, balance_v; ///< velocity in geostrophic balance with the tilt (Coriolis acts on U minus this), m/s
     double tilt_ax, tilt_ay;     ///< −g ∇η beyond that balance, m/s²
     bool tilt_moves_water;       ///< that is dU_w/dt (tilt: dynamic), which acts on the added mass, too
+    // what floes leave of each other's drag (src/force/exposure.h)
+    double lee;            ///< λ, length of the lee of an edge / its height, 0 = no edge is sheltered
+    double draft;          ///< of ice / its thickness, ρ_i/ρ_w
+    double lee_reach;      ///< farthest that any floe shelters, m
+    bool covers;           ///< sheets that lie on each other share their skin drag
+    double exposure_slow;  ///< floes past which fluids flow slower, m/s, are looked at less often
+    int64_t exposure_steps; ///< steps from one look at it to the next, 0 = never: all bodies have all of their drag
 } bt_params;
 
 struct bt_cells;

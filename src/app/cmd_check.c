@@ -232,7 +232,7 @@ static void print_environment(const bt_case *c)
 static void print_drift(const bt_case *c, const bt_check_ice *n)
 {
     double v[2][2];
-    bt_setup_drift(c, n->size, n->thickness, v[0], v[1]);
+    bt_setup_drift(c, n->size, n->thickness, n->concentration, v[0], v[1]);
     static const char *const names[] = {"free drift, mean floe", "free drift, body"};
     for (int k = n->count < 1; k < 2; k++)
         if (bt_hypot(v[k][0], v[k][1]) > 0) printf("%-20s (%.4g, %.4g) m/s at the start\n", names[k], v[k][0], v[k][1]);

@@ -66,7 +66,7 @@ static void order_speeds(const bt_case *c, bt_estimate_input *in)
     double ice[2], body[2];
     const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
     if (bt_environment_changes(c) || (walls && in->concentration < BT_BOUND_CONCENTRATION - BT_MADE_OFF)) return;
-    bt_setup_drift(c, 2 * in->floe_radius, in->thickness, ice, body);
+    bt_setup_drift(c, 2 * in->floe_radius, in->thickness, in->concentration, ice, body);
     bt_estimate_ordered(c, ice, &ordered);
     in->speed = ordered.speed;
     in->along = in->ordered = ordered.along;

@@ -4,7 +4,7 @@
 // HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours ends in a seal of
 // 128 bytes, which is compared with all that stands before it before HDF5 sees a byte:
 //
-//     bergtow sealed file\nkind: checkpoint 3\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//     bergtow sealed file\nkind: checkpoint 4\nbytes: 123456\nxxh128: 0123...\n, then zeros
 //
 // HDF5 notes in its first bytes where its own part ends, and no reader of HDF5 or netCDF looks further. The seal must
 // be, to the last byte, what length and digest (XXH3, 128 bits) of that part make it: any flipped bit, any cut, any
@@ -25,7 +25,7 @@ enum {
 };
 
 // Kinds carry the version of the format: another one is refused with both names.
-#define BT_CHECKSUM_CHECKPOINT "checkpoint 3"
+#define BT_CHECKSUM_CHECKPOINT "checkpoint 4"
 #define BT_CHECKSUM_RESULT "result 2"
 #define BT_CHECKSUM_FIELD "field 2"
 #define BT_CHECKSUM_ENSEMBLE "ensemble 2"

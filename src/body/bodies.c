@@ -9,12 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+const bt_exposure bt_exposed = {1, 1, 1};
+
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
-    FIELD(vel),       FIELD(inv),  FIELD(pose),   FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
-    FIELD(radius),    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share),     FIELD(friction), FIELD(restitution),
-    FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(lap),
-    FIELD(home),
+    FIELD(vel),       FIELD(inv),  FIELD(pose),     FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
+    FIELD(radius),    FIELD(area), FIELD(mass),     FIELD(inertia), FIELD(share),     FIELD(friction),
+    FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(exposure), FIELD(motion), FIELD(large),
+    FIELD(disturbed), FIELD(cell), FIELD(lap),      FIELD(home),
 };
 int bt_bodies_n_fields(const bt_bodies *b)
 {
@@ -145,6 +147,7 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
     b->restitution[i] = d->restitution;
     b->thickness[i] = d->thickness;
     b->drag[i] = d->drag;
+    b->exposure[i] = bt_exposed;
     b->motion[i] = (uint8_t)d->motion;
     b->large[i] = d->large;
     b->disturbed[i] = 1;

@@ -20,6 +20,9 @@ int bt_bodies_n_fields(const bt_bodies *b);
 extern const bt_body_field bt_vertex_fields[];
 extern const int bt_n_vertex_fields;
 
+/// All of the drag.
+extern const bt_exposure bt_exposed;
+
 /// Room for n bodies and n_vertices vertices.
 void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 void bt_bodies_free(bt_bodies *b);
@@ -51,6 +54,20 @@ static inline bool bt_bodies_drift(const bt_world *w, const bt_vel *v)
 /// parts after it.
 double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n, double dx,
                        double dy);
+
+/// Is body i a sheet that may slide over others (contact/raft.h)?
+static inline bool bt_bodies_sheet(const bt_bodies *b, bt_idx i, bt_gid towed)
+{
+    return b->thickness[i] > 0 && b->motion[i] != BT_STATIC && b->gid[i] != towed && bt_part_first(b, i) == 0;
+}
+
+/// May i and j slide over each other? deck: freeboard / thickness.
+static inline bool bt_bodies_slide(const bt_bodies *a, bt_idx i, const bt_bodies *b, bt_idx j, bt_gid towed,
+                                   double deck)
+{
+    const double h = a->thickness[i], g = b->thickness[j];
+    return bt_bodies_sheet(a, i, towed) && bt_bodies_sheet(b, j, towed) && deck * bt_max(h, g) <= bt_min(h, g);
+}
 
 /// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.
 static inline double bt_into_period(double x, double low, double period, int32_t *laps)

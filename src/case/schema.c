@@ -170,6 +170,12 @@ bt_key bt_case_keys[] = {
     REAL("ice.drag.tangential", ice.drag.tangential, RATIO, "0", "[0, 1]",
          "share of the flow along a side that counts in the moment of form drag on floes; 0: pressure, as "
          "body.drag.tangential"),
+    REAL("ice.drag.sheltering", ice.sheltering, RATIO, "5.556", "[0, 100]",
+         "length over which the lee of a floe's edge fades / height of the edge, 1/s; form drag of the edge of a floe "
+         "at the distance D behind another one is 1 - exp(-s D/height) of that in the free stream, height: draft in "
+         "the water, freeboard in the air; s 0.18 [Hanssen-Bauer & Gjessing 1988; Steele et al. 1989; Tsamados et al. "
+         "2014], 0.5 [Luepkes et al. 2012] is 2; 0 = none: every edge feels the free stream. The default lowers the "
+         "drag of floes in company, and so the load on a body that pushes them"),
     CHOICE("ice.start", ice.start, starts, "drift",
            "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, "
            "water, Coriolis and slope at time zero balance, none across walls; rest: 0"),

@@ -90,16 +90,10 @@ static const double *own_of(const bt_world *w) { return w->par.law_own[BT_LAW_RA
 
 static double thinner(const bt_bodies *s, bt_idx a, bt_idx b) { return bt_min(s->thickness[a], s->thickness[b]); }
 
-static bool is_floe(const bt_world *w, bt_idx i)
-{
-    const bt_bodies *s = &w->bodies;
-    return s->thickness[i] > 0 && s->motion[i] != BT_STATIC && s->gid[i] != w->towed && bt_part_first(s, i) == 0;
-}
-
 static bool applies(const bt_world *w, bt_idx a, bt_idx b)
 {
-    const double *h = w->bodies.thickness, deck = own_of(w)[BT_RAFT_FREEBOARD] * bt_max(h[a], h[b]);
-    return is_floe(w, a) && is_floe(w, b) && deck <= thinner(&w->bodies, a, b);
+    const bt_bodies *s = &w->bodies;
+    return bt_bodies_slide(s, a, s, b, w->towed, own_of(w)[BT_RAFT_FREEBOARD]);
 }
 
 /// q0, N/m.

@@ -13,7 +13,8 @@
 
 static inline void bt_add_water_drag(const bt_force_body *b, bt_load *l)
 {
-    bt_load_stream(l, b->par->water_u, b->par->water_v, b->drag->water_skin, b->drag->water_form);
+    bt_load_stream(l, b->par->water_u, b->par->water_v, b->drag->water_skin * b->exposure->skin,
+                   b->drag->water_form * b->exposure->water_form);
 }
 
 static inline bool bt_water_rests(const bt_params *p, const double *own)
@@ -32,7 +33,8 @@ static const bt_force_law bt_law_water_drag = {
 
 static inline void bt_add_air_drag(const bt_force_body *b, bt_load *l)
 {
-    bt_load_stream(l, b->par->air_u, b->par->air_v, b->drag->air_skin, b->drag->air_form);
+    bt_load_stream(l, b->par->air_u, b->par->air_v, b->drag->air_skin * b->exposure->skin,
+                   b->drag->air_form * b->exposure->air_form);
 }
 
 static inline bool bt_air_rests(const bt_params *p, const double *own)
@@ -49,7 +51,7 @@ static const bt_force_law bt_law_air_drag = {
     .add = bt_add_air_drag,
 };
 
-static inline void bt_add_yaw_drag(const bt_force_body *b, bt_load *l) { l->yaw += b->drag->yaw; }
+static inline void bt_add_yaw_drag(const bt_force_body *b, bt_load *l) { l->yaw += b->drag->yaw * b->exposure->skin; }
 
 // One law for both fluids: what rests turns in neither, and the body has one coefficient.
 static const bt_force_law bt_law_yaw_drag = {

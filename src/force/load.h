@@ -43,6 +43,7 @@ static inline bt_force_body bt_load_body(const bt_world *w, bt_idx i, const bt_v
     return (bt_force_body){
         .par = &w->par,
         .drag = &b->drag[i],
+        .exposure = &b->exposure[i],
         .vel = *u,
         .time = bt_load_time(w),
         .mass = b->mass[i],

@@ -19,7 +19,7 @@
 // derived from case and field by the same functions as in a fresh run, - of one step alone:
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
-//   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, lap
+//   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, lap, exposure
 //                     D outline (a function of the yaw alone), gid, offset, mark, vertices, per_length,
 //                       radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw

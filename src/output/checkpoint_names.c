@@ -53,6 +53,8 @@ static const row rows[] = {
     {"bodies/pose", "m, m, rad", "x, y, yaw of every body, by id", "body component"},
     {"bodies/velocity", "m/s, m/s, rad/s", "velocity of every body, x, y and turning", "body component"},
     {"bodies/path", "m", "length of path of the fastest point of the outline, through the water's frame", "body"},
+    {"bodies/exposure", "1", "share of a floe's drag that its neighbours leave: skin, form in water, form in air",
+     "body component"},
     {"bodies/tile", "1", "cell of each body, x and y", "body xy"},
     {"bodies/stirred", "1", "1 = disturbed since it came to rest", "body"},
     {"bodies/lap", "1", "periods along x that the body lies above its pose, which is wrapped", "body"},

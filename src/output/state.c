@@ -186,7 +186,7 @@ void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
 /// What a body carries from step to step. Everything else about it follows from the case and
 /// the field.
 typedef struct {
-    double pose[3], vel[3], path;
+    double pose[3], vel[3], path, exposure[3];
     int32_t cell[2], copy, lap;
     int64_t disturbed;
 } body_row;
@@ -196,7 +196,7 @@ static const bt_state_row body_columns[] = {
     MEMBER(body_row, "pose", F64, 3, pose),         MEMBER(body_row, "velocity", F64, 3, vel),
     MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "tile", I32, 2, cell),
     MEMBER(body_row, "copy", I32, 1, copy),         MEMBER(body_row, "lap", I32, 1, lap),
-    MEMBER(body_row, "stirred", I64, 1, disturbed),
+    MEMBER(body_row, "stirred", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -205,6 +205,7 @@ static body_row row_of(const bt_bodies *b, bt_idx i)
         .pose = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw},
         .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
         .path = b->path[i],
+        .exposure = {b->exposure[i].skin, b->exposure[i].water_form, b->exposure[i].air_form},
         .cell = {b->cell[i][0], b->cell[i][1]},
         .copy = b->home ? b->home[i].copy : 0,
         .lap = b->lap[i],
@@ -219,6 +220,7 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
     bt_bodies_turn(&w->bodies, i);
     b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
     b->path[i] = r->path;
+    b->exposure[i] = (bt_exposure){r->exposure[0], r->exposure[1], r->exposure[2]};
     b->cell[i][0] = r->cell[0];
     b->cell[i][1] = r->cell[1];
     if (b->home) b->home[i].copy = r->copy;

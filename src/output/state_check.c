@@ -151,6 +151,8 @@ static bool in_box(const bt_cells *t, const int32_t at[2])
     return at[0] >= t->low_x && at[0] - t->low_x < t->n_x && at[1] >= t->low_y && at[1] - t->low_y < t->n_y;
 }
 
+static bool is_share(double x) { return x >= 0 && x <= 1; }
+
 static void check_bodies(const bt_world *w, bt_snapshot *s)
 {
     const bt_bodies *b = &w->bodies;
@@ -161,6 +163,9 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, isfinite(p->x) && isfinite(p->y) && isfinite(p->yaw), "bodies/pose", g, "is not finite");
         bt_snapshot_want(s, isfinite(v->x) && isfinite(v->y) && isfinite(v->w), "bodies/velocity", g, "is not finite");
         bt_snapshot_want(s, isfinite(b->path[i]) && b->path[i] >= 0, "bodies/path", g, "is no length");
+        const bt_exposure *e = &b->exposure[i];
+        bt_snapshot_want(s, is_share(e->skin) && is_share(e->water_form) && is_share(e->air_form), "bodies/exposure", g,
+                         "is no share");
         const int32_t copy = b->home ? b->home[i].copy : 0;
         bt_snapshot_want(s, copy >= -FAR && copy <= FAR, "bodies/copy", g, "is out of range");
         bt_snapshot_want(s, b->lap[i] >= -FAR && b->lap[i] <= FAR, "bodies/lap", g, "is out of range");

@@ -58,10 +58,14 @@ static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
     const double pushed = d->slope + bt_hypot(load.fx, load.fy) / b->mass[i],
                  drawn = ratio(bt_hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
-    const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));
+    // at worst the lee of others takes all form drag of the water, and none of the wind
+    const double form = w->par.lee > 0 && k->water_skin > 0 && b->gid[i] != w->towed ? 0 : k->water_form;
+    const double alpha = form > 0 || k->water_form == 0
+                             ? sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)))
+                             : sqrt(ratio(k->air_skin + k->air_form * width, k->water_skin));
     const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);
     const double wind = share <= 1 ? d->wind * share / (1 + share) : d->wind;
-    const double terminal = sqrt(ratio(mass * pushed, k->water_skin + k->water_form * b->area[i] / width));
+    const double terminal = sqrt(ratio(mass * pushed, k->water_skin + form * b->area[i] / width));
     const double push = bt_min(pushed * d->duration, bt_max(pushed * d->dt, terminal));
     return bt_max(d->prescribed, d->water + wind + push + drawn);
 }

@@ -11,6 +11,7 @@
 #include "contact/contacts.h"
 #include "force/drift.h"
 #include "force/environment.h"
+#include "force/exposure.h"
 #include "force/forces.h"
 #include "loads/impact.h"
 #include "tow/tow.h"
@@ -61,6 +62,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .air_v = air[1],
         .coriolis = turn,
         .tilt_moves_water = c->water.tilt == BT_TILT_DYNAMIC,
+        .lee = c->ice.sheltering,
+        .draft = c->ice.density / c->water.density,
+        .covers = c->ice.rafting_kappa > 0,
     };
     if (c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC) {
         p.balance_u = water[0];
@@ -229,8 +233,9 @@ static void add_wall(const bt_case *c, bt_world *w, double x, double y, double h
 /// Does body i begin with its free drift?
 static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, bt_idx n_field)
 {
+    const bt_gid g = w->bodies.gid[i];
     if (c->ice.start != BT_START_DRIFT || w->bodies.motion[i] != BT_DYNAMIC) return false;
-    return i < n_field || (i == w->towed ? isnan(c->body.vx) : isnan(c->floes[i - n_field].vx));
+    return g < n_field || (g == w->towed ? isnan(c->body.vx) : isnan(c->floes[g - n_field].vx));
 }
 
 /// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given.
@@ -256,8 +261,24 @@ static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors
     return lost == 0;
 }
 
-/// A world with one round floe of this size and thickness.
-static bt_world *one_floe(const bt_case *c, double size, double thickness)
+/// Floes in company. In a field their lee and their drift follow from each other: from the drift of lone floes, in
+/// rounds, every floe with the factors of all (exposure.h), which undisturbed ice keeps.
+static bool begin_sheltered(const bt_case *c, bt_world *w, bt_idx n_field, bt_gid n_floes, bt_errors *err)
+{
+    enum { ROUNDS = 2 };
+    bool found = true;
+    bt_exposure_setup(w, bt_case_reference_speed(c));
+    for (int k = 0; k < ROUNDS && w->par.lee > 0 && w->par.exposure_steps > 0 && found; k++) {
+        bt_exposure_look(w);
+        const bt_exposure mean = bt_exposure_mean(w, n_floes);
+        for (bt_gid g = 0; g < n_floes; g++) w->bodies.exposure[bt_world_index(w, g)] = mean;
+        found = begin_drift(c, w, n_field, err);
+    }
+    return found;
+}
+
+/// A world with one round floe of this size and thickness, with the lee of others at this concentration.
+static bt_world *one_floe(const bt_case *c, double size, double thickness, double concentration)
 {
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
@@ -266,15 +287,17 @@ static bt_world *one_floe(const bt_case *c, double size, double thickness)
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
     floe_def(c, 24, v, thickness, &d);
-    bt_world_add(w, &d);
+    const bt_gid g = bt_world_add(w, &d);
+    w->bodies.exposure[g] = bt_exposure_estimate(&w->par, size, thickness, concentration);
     return w;
 }
 
-void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+void bt_setup_drift(const bt_case *c, double size, double thickness, double concentration, double floe[2],
+                    double body[2])
 {
     floe[0] = floe[1] = body[0] = body[1] = NAN;
     if (c->ice.start != BT_START_DRIFT) return;
-    bt_world *w = one_floe(c, size, thickness);
+    bt_world *w = one_floe(c, size, thickness, concentration);
     double thicknesses[2];
     bt_errors unfound = {0}; // NaN says it
     if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
@@ -304,7 +327,7 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
         return (bt_track){0};
     bt_case coarse = *c;
     coarse.run.dt = c->run.duration / (POINTS - 1);
-    bt_world *w = one_floe(&coarse, size, thickness);
+    bt_world *w = one_floe(&coarse, size, thickness, concentration);
     w->environment = bt_environment_create(&coarse);
     bt_errors unfound = {0};
     begin_drift(&coarse, w, 1, &unfound); // where it is not found from rest, as undisturbed ice goes on
@@ -622,12 +645,6 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
-    bool held[2];
-    held_ice(c, f->concentration, held);
-    // floes by hand are no ice beside a field
-    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes, held);
-    if (c->domain.ends == BT_BOUND_MOVING && with_body)
-        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     *out = w;
     if (!drifts) return BT_ERR_CASE;
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, f->n, first_wall, err);
@@ -636,6 +653,13 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls
     // may not be.
     if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
+    if (!begin_sheltered(c, w, f->n, r->n_floes, err)) return BT_ERR_CASE;
+    bool held[2];
+    held_ice(c, f->concentration, held);
+    // floes by hand are no ice beside a field
+    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes, held);
+    if (c->domain.ends == BT_BOUND_MOVING && with_body)
+        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     // all have just been looked at: what rests needs no first step to show it
     memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     return BT_OK;

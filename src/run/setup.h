@@ -13,9 +13,11 @@
 /// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_roster *r, bt_errors *err);
 
-/// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed
-/// body into body, m/s; NaN where ice.start, the tow or a velocity that is given has it otherwise.
-void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2]);
+/// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) in ice of this concentration,
+/// whose lee is estimated (force/exposure.h), into floe, and of the towed body into body, m/s; NaN where ice.start, the
+/// tow or a velocity that is given has it otherwise.
+void bt_setup_drift(const bt_case *c, double size, double thickness, double concentration, double floe[2],
+                    double body[2]);
 
 /// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it
 /// pulls), with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration.

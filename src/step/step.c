@@ -9,6 +9,7 @@
 #include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
+#include "force/exposure.h"
 #include "force/forces.h"
 #include "loads/impact.h"
 #include "solve/solver.h"
@@ -264,6 +265,7 @@ void bt_world_step(bt_world *w)
     if (w->tow)
         memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_tow_lead(w);
+    bt_exposure_begin(w); // of floes, in some steps
     bt_forces_begin(w);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);

@@ -40,8 +40,10 @@ static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
         v->radius += b->radius[i];
         v->area += b->area[i];
         v->thickness += b->thickness[i];
-        v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
-        v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
+        const bt_drag *d = &b->drag[i];
+        v->exposure = b->exposure[i];
+        v->drag.water_skin += d->water_skin + v->exposure.water_form * d->water_form * perimeter / BT_PI;
+        v->drag.air_skin += d->air_skin + v->exposure.air_form * d->air_form * perimeter / BT_PI;
         // relative to the water, so that the mean of floes that rest in it does to the last bit
         v->vel.x += b->vel[i].x - w->par.water_u;
         v->vel.y += b->vel[i].y - w->par.water_v;
@@ -60,7 +62,7 @@ static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
 void bt_undisturbed_create(bt_world *w, bt_gid n_floes, const bool held[2])
 {
     bt_undisturbed *v = w->undisturbed = bt_alloc(1, sizeof *v);
-    *v = (bt_undisturbed){.held = {held[0], held[1]}};
+    *v = (bt_undisturbed){.held = {held[0], held[1]}, .exposure = bt_exposed};
     mean_floe(w, v, n_floes);
     if (held[0]) v->vel.x = 0;
     if (held[1]) v->vel.y = 0;
@@ -75,7 +77,8 @@ void bt_undisturbed_advance(bt_world *w)
     const bt_bodies one = {
         .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
     bt_force_body mean = {
-        .drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
+        .drag = &v->drag, .exposure = &bt_exposed, .vel = v->vel, .mass = v->mass, .inertia = v->inertia,
+        .share = v->share, .all = &one};
     const bt_vel water = {.x = w->par.water_u, .y = w->par.water_v};
     bt_vel u = v->mass > 0 ? bt_forces_drift(w, &mean) : water;
     // A law that depends on the place. The ice that a window takes in has none, and the run ends.

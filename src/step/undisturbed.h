@@ -16,6 +16,7 @@ typedef struct bt_undisturbed {
     double mass, inertia, radius, area, thickness; ///< mean floe; mass 0 = no ice: then it goes with the water
     bt_drag drag;         ///< its drag, that along the outline as part of the skin's
     double share;         ///< m/M of all floes together
+    bt_exposure exposure; ///< which all floes of the field begin with; in `drag`
     // state
     double drift_x, drift_y; ///< way since the start, m
     bt_vel vel;           ///< m/s

@@ -256,6 +256,7 @@ static void put(bt_world *w, bt_idx i)
     h->copy += (int32_t)v->sign;
     b->lap[i] = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = w->undisturbed->vel;
+    b->exposure[i] = w->undisturbed->exposure;
     b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
 }

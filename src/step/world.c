@@ -89,6 +89,9 @@ uint64_t bt_world_hash(const bt_world *w)
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
+        const bt_exposure *e = &b->exposure[i];
+        if (e->skin != 1 || e->water_form != 1 || e->air_form != 1)
+            h = mix_double(mix_double(mix_double(h, e->skin), e->water_form), e->air_form);
         if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->lap[i]));
         sum += h;
     }
