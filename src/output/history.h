@@ -37,9 +37,9 @@ typedef enum bt_column {
     BT_N_COLUMNS
 } bt_column;
 
+/// What the summary keeps of every step, whatever output.sample_every says: 200 bytes a step.
 /// A load that is no number (bt_sample.no_load) is kept as the last one before it, 0 at the start: it has no bound, so
 /// any number is below it, and means, percentiles and peaks of what is kept are the least that they can be.
-/// What the summary keeps of every step, whatever output.sample_every says: 200 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity
