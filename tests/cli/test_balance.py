@@ -113,8 +113,8 @@ def cubic(v):
 
 
 def outline_drag(outline, yaw, at, ref, skin, form):
-    """Drag of one fluid as load - matrix @ (u, v, w): skin |v| v, and form max(0, -v.n) v along the outline by
-    quadrature over the sides that water meets."""
+    """Drag of one fluid as load - matrix @ (u, v, w): skin |v| v, and form max(0, -v.n) v along the outline, with the
+    arm along each side, by quadrature over the sides that water meets."""
     c, s = np.cos(yaw), np.sin(yaw)
     corners = outline @ np.array([[c, s], [-s, c]])
     nodes, weights = np.polynomial.legendre.leggauss(5)
@@ -130,7 +130,8 @@ def outline_drag(outline, yaw, at, ref, skin, form):
         for a, b in zip(cut, cut[1:]):
             for x, weight in zip(nodes, weights):
                 r = p + (q - p) * (a + (b - a) * (x + 1) / 2)
-                points.append((form * weight * (b - a) / 2 * max(0, -local(r) @ normal), r))
+                arm = (q - p) * ((q - p) @ r) / ((q - p) @ (q - p))
+                points.append((form * weight * (b - a) / 2 * max(0, -local(r) @ normal), arm))
     matrix, load = np.zeros((3, 3)), np.zeros(3)
     for g, r in points:
         j = np.array([[1, 0, -r[1]], [0, 1, r[0]]])

@@ -455,9 +455,8 @@ static void energy_at_any_time_step(void **state)
     }
 }
 
-/// A corner at rest that a steady force L presses into a wall from now on goes in to 2 L/κ, F = κ d, where the force has
-/// given what crushing took. An edge shorter than the least length bears p h times that, both of its
-/// ends together.
+/// A corner at rest that a steady force L presses into a wall from now on goes in to 2 L/κ, F = κ d, where the force
+/// has given what crushing took. An edge shorter than the least length bears p h times that, both of its ends together.
 static void pressed_from_rest(void **state)
 {
     (void)state;
