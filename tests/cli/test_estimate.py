@@ -294,7 +294,7 @@ def test_ice_that_the_wind_drives_along_is_not_met_at_the_speed_of_the_tow(tmp_p
     still = run(tmp_path, changed(DRIVEN, domain__ends="periodic"), name="still")
     assert still.summary["estimates"]["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=3e-3)
     before = estimate(tmp_path, DRIVEN)
-    assert before["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.02)
+    assert before["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.03)  # the lee is estimated
     # the tow keeps the speed that it asks for, whatever the ice does
     assert e["ordered_speed_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-9)
     assert before["ordered_speed_m_s"] == before["speed_along_m_s"]
