@@ -51,7 +51,7 @@ CLOSING = {
     "ice": {"concentration": 0.7, "size": 0.9},
     "body": {"shape": "none"},
     "solver": {"max_sweeps": 2, "position_sweeps": 0},
-    "guard": {"overlap": 0},
+    "guard": {"overlap": 0, "no_solution": 0},
 }
 
 

@@ -28,7 +28,7 @@ def test_a_floe_beyond_a_wall_is_named_once(tmp_path, ranks):
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_overlap_of_the_last_state(tmp_path, ranks):
-    case = changed(CLOSING, run__duration=2.5, guard={"overlap": 0, "escape": False}, **WIDE)
+    case = changed(CLOSING, run__duration=2.5, guard={"overlap": 0, "no_solution": 0, "escape": False}, **WIDE)
     one = run(tmp_path, case, "--quiet")
     assert one.summary["max_overlap_m"] > one.series("overlap").max()
     assert mpirun(ranks, "run", write_case(tmp_path, case), "-o", tmp_path / "several", "--quiet").returncode == DONE
