@@ -110,12 +110,11 @@ static double draw(const bt_bodies *b, bt_idx i, double vx, double vy, lines *l)
     const int n = bt_body_corners(b, i);
     const bt_mark *mark = b->mark + b->offset[i];
     const double size = sqrt(vx * vx + vy * vy);
-    double hull[2 * BT_MAX_VERTICES], v[2 * BT_MAX_VERTICES], out[LINES];
+    l->along[0] = vx / size, l->along[1] = vy / size;
+    double v[2 * BT_MAX_VERTICES], out[LINES];
     int m = 0;
     for (int k = 0; k < n; k++)
-        if (mark[k].next != k) memcpy(hull + 2 * m++, b->outline + 2 * (b->offset[i] + k), 2 * sizeof *hull);
-    l->along[0] = vx / size, l->along[1] = vy / size;
-    turn(l->along, 0, 0, m, hull, v);
+        if (mark[k].next != k) turn(l->along, 0, 0, 1, b->outline + 2 * (b->offset[i] + k), v + 2 * m++);
     double low = INFINITY, high = -INFINITY;
     for (int k = 0; k < m; k++) low = bt_min(low, v[2 * k + 1]), high = bt_max(high, v[2 * k + 1]);
     l->from = low;
