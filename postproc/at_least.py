@@ -50,6 +50,11 @@ def of(value, some):
     return AtLeast(value, sum(shares) / len(some)) if shares else value
 
 
+def ended(why):
+    """Was it the guard of steps without a solution that ended a run? why: the program's words, which name its key."""
+    return "guard.no_solution" in (why or "")
+
+
 def words(share):
     """What stands beside such numbers, once a page."""
     return f"in {100 * share:.2g} % of the steps the load has no bound"

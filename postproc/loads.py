@@ -119,10 +119,17 @@ def cut_off(e, rows, load):
     """Why a load has no tail, "" where it may have one: steps without a solution, or lines that parted where that
     matters to it. Tows that are excluded count: those that are left are the ones that the line survived."""
     through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
-    if n := sum(e.number("window_no_load_share", m) > 0 for m in tows):
-        return f"the load of the body has no bound in some steps of {n} of {len(tows)} tows"
+    if without := e.without_bound(rows):
+        return str(without)
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
     return f"the line parted in {n} of {len(tows)} tows" if n else ""
+
+
+def bounded(found, without):
+    """Names of the loads of a condition that a line bounds, even in steps without a solution: tensions, and the tow
+    force where there are any. None of them where tows ended for it: which are left depends on their loads."""
+    tensions = {name for name, x in found.items() if x["needs"] in LINE}
+    return set() if without.ended or not tensions else tensions | {ALWAYS[0]}
 
 
 def in_window(e, m, time_scale):

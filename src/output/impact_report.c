@@ -54,7 +54,7 @@ void bt_impacts_print(const bt_impact_count *c, bool at_least)
     if (at_least) printf("the quasi-static rest has no bound\n");
     else printf("quasi-static %s\n", bt_force_text(b, c->push_resistance));
     if (c->n > 0) {
-        printf("    peaks (%s%s)", least, c->conversion);
+        printf("    peaks%s (%s)", at_least ? ", at least" : "", c->conversion);
         double *peaks = sorted(c);
         // A few of the ranks: the largest, then tenfold.
         for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
