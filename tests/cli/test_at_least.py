@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import ROOT, call, changed, run, write_case
+from harness import ROOT, call, run, write_case
 from test_locked import jam
 
 sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "tests")]
