@@ -231,6 +231,8 @@ MUTANTS = {
                             "cli/test_locked.py::test_a_wedge_below_its_angle_of_friction_has_no_load",
                             "cli/test_locked.py::test_a_wedge_above_it_is_not_locked_when_work_is_short",
                             "cli/test_locked.py::test_a_wedge_that_is_dragged_out_is_not_locked",
+                            "cli/test_locked.py::"
+                            "test_friction_proves_nothing_of_loads_that_the_sweeps_have_not_come_to",
                             "cli/test_locked.py::test_a_lock_below_the_tolerance_is_none_beside_a_jam_either",
                             "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
@@ -243,6 +245,8 @@ MUTANTS = {
         ("        u->mu *= BT_LOCKED_STICKS;\n", "", "loads of the proof go to the rim of their cones"),
         ("if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu", "if (!held) u->mu",
          "friction of contacts that slide holds"),
+        ("    if (held) keep_near(w, s, &l);", "    if (held && false) keep_near(w, s, &l);",
+         "loads of the proof need not be those of the sweeps"),
         ("    keep_above(w, s, w->par.tolerance);\n", "", "what passes for rest is locked"),
     ]),
     "src/solve/project.c": (PROJECT, [
