@@ -157,7 +157,7 @@ def condition(e, c, members, options):
     if without and len(rows):
         out = at_least.condition(out, str(without), without.share, loads.bounded(out["loads"], without))
     out["without_bound"] = {"share": without.share, "some": without.some, "ended": without.ended, "tows": without.tows,
-                            "words": without.words(named=True)} if without else None
+                            "words": without.words(named=True)}  # "" where there are none
     return out | {"design": statement.statement(e, rows, out)}
 
 
@@ -269,8 +269,7 @@ def csv_row(c, load_names):
                                                            for k, n in c["members"]["doubts"].items()}
     }
     w = c["without_bound"]
-    row |= {"at_least": int(bool(w)), "no_load_share": w["share"] if w else 0.0,
-            "ended_without_solution": len(w["ended"]) if w else 0}
+    row |= {"at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
     for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
                 "largest_share", "fields_needed"):
         row[key] = r.get(key)

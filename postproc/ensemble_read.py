@@ -267,7 +267,8 @@ class Ensemble:
         """(time s, values) of a series over a member's whole run; of steps without a load by bergtow_read.least."""
         time, x = (self._series[key][m] for key in ("time", name))
         there = np.isfinite(time)
-        return time[there], least(x[there])
+        x = x[there]
+        return time[there], least(x) if self.number("no_load_steps", m) > 0 else x
 
     def steady(self, m):
         """Ice resistance over the window of a member's tow, N; empty where there is none."""

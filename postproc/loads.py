@@ -54,6 +54,11 @@ class Load:
     conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
 
 
+def filler(run):
+    """What makes a load of a series: of a run with steps without a solution `least`; NaN of another kind stays."""
+    return least if run.number("no_load_steps") > 0 else np.asarray
+
+
 def _floe_force(run):
     """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
     if not {"largest_push", "impact_peak"} <= set(run.series_names):
@@ -62,7 +67,7 @@ def _floe_force(run):
     if not (np.isfinite(push).any() and np.isfinite(peak).any()):
         return None
     conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
-    push = least(push)
+    push = filler(run)(push)
     return Load("floe_force", "force of one floe", run.units("largest_push"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
@@ -80,11 +85,11 @@ def _panel_load(run):
 
 def of_run(run):
     """[(Load, values)] of a run and the times of the values."""
-    out = []
+    out, filled = [], filler(run)
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
             out.append((Load(name, run.label(name), run.units(name), run.description(name),
-                             run.attribute(name, "needs")), least(run[name])))
+                             run.attribute(name, "needs")), filled(run[name])))
     return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
 
 

@@ -337,7 +337,7 @@ def statement(e, rows, c):
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, case, lines) + warned
-    if c["without_bound"]:
+    if c["without_bound"]["words"]:
         warned = [("means, peaks and quantiles are at least those given, and there is no design value, since nothing "
                    "bounds some loads: let ice give way (ice.rafting.kappa, ice.crushing.pressure)",
                    c["without_bound"]["words"])] + warned
