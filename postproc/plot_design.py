@@ -65,7 +65,7 @@ def draw(conditions, numeric, axis_label, times):
     least = [k for k in there if isinstance(tows[k]["mean"], AtLeast)]
     if least:
         axes.plot(x[least], [tows[k]["largest"] / factor for k in least], "^", color=style.JAM, markersize=7, zorder=5,
-                  label="at least: steps without a solution")
+                  label="largest, at least")
     starts = [(k, tows[k]["start_up"]["largest"]) for k in there if statement.start_exceeds(tows[k])]
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,

@@ -301,7 +301,7 @@ def draw_runs(axes, points, factor, low, log):
              if isinstance(p.mean, at_least.AtLeast) and (p.mean > 0 or not log)]
     if least:
         axes.plot(*zip(*least), linestyle="none", marker="^", color=style.JAM, markersize=7, zorder=7,
-                  label="simulated, at least: steps without a solution")
+                  label="simulated, at least")
     if averaged:
         centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
         reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
