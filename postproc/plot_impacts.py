@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Loads around the hull by panel, and how often the peak of a collision is exceeded."""
+import command  # first: it has words for packages that are missing
 import at_least
-import command
 import style
 from bergtow_read import Run, RunError
 

@@ -10,8 +10,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import command  # first: it has words for packages that are missing
 import at_least
-import command
 import compared
 import stat_drift
 import style
