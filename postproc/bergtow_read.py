@@ -20,6 +20,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import at_least
+
 
 def within(time, start, end):
     """[n] of bool: samples that end between two times, these included, but for a last one of fewer steps than the
@@ -230,7 +232,7 @@ class Run:
             raise RunError(path, f"damaged ({error})", "run the case again") from None
         if not isinstance(summary, dict):
             raise RunError(path, "damaged (no JSON object)", "run the case again")
-        return summary
+        return at_least.summary(summary)
 
     def _open(self):
         if not self.result.exists():
@@ -417,9 +419,7 @@ class Run:
     def mean_name(self):
         """How a mean of it may be called."""
         found = "mean" if self.verdict[0] == "steady" else "mean over the window"
-        share = 100 * self.number("window.no_load_share")
-        return f"{found}, at least (in {share:.2g} % of its steps the load has no bound)" \
-            if self.at_least else found
+        return f"{found} ({at_least.words(self.number('window.no_load_share'))})" if self.at_least else found
 
     def interval(self, key):
         """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;
@@ -436,6 +436,8 @@ class Run:
         value = self.summary
         for part in key.split("."):
             value = value.get(part) if isinstance(value, dict) else None
+        if isinstance(value, at_least.AtLeast):
+            return value
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
 
     @property
@@ -642,8 +644,17 @@ class Run:
         return self._frame("body_pose", frame, len(self.bodies)) if self.bodies else np.zeros((0, 3))
 
     def contact_force(self, frame):
-        """[N] N, largest normal contact force on each floe in the step of the frame."""
+        """[N] N, largest normal contact force on each floe in the step of the frame; NaN where that has no solution."""
         return self._frame("contact_force", frame, self.n_floes)
+
+    def least_contact_force(self, frame):
+        """The same for pictures: that of the last frame before whose step has a solution stands in for NaN, 0 at the
+        start, as in series."""
+        for k in range(frame % max(1, self.n_frames), -1, -1):
+            force = self.contact_force(k)
+            if not np.isnan(force).any():
+                return force
+        return np.zeros(self.n_floes)
 
     def speed(self, frame):
         """[N] m/s, speed of each floe."""

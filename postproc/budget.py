@@ -28,6 +28,7 @@ import h5py
 import numpy as np
 
 BUDGET = 15.0  # min
+BOUNDED = "mean_drag", "mean_line", "peak_line", "mean_vessel"  # numbers of the summary that a lock leaves alone
 OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
 
 
@@ -140,6 +141,9 @@ def of_ensemble(e, of=OF[0], computed=None):
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
                        CASE)
     meaning, done, values = numbers(e, of)
+    if (without := e.without_bound(np.arange(e.n))) and not of.startswith(BOUNDED):
+        raise RunError(e.file, f"has no budget of {of}: {without}", "let ice give way (ice.rafting.kappa, "
+                       "ice.crushing.pressure), or name another number with --of", CASE)
     sample = fair(e)
     there = np.isin(done, sample)
     rows, values = done[there], values[there]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import analysis
+import at_least
 import command  # first: it has words for packages that are missing
 import bracket
 import compared
@@ -150,6 +151,8 @@ class Search:
         for i, w in zip(numbers, why):
             if w == SPENT:
                 return False
+            if at_least.ended(w):  # which tows it ends depends on their loads
+                raise RunError(self.runs.path(name, i), w, "without it the limit would be that of the other tows", CASE)
             if w:
                 failed.append(w)
                 point.failed += 1

@@ -10,6 +10,7 @@ import argparse
 from pathlib import Path
 
 import analysis
+import at_least
 import command
 import ensemble_text
 import loads
@@ -34,9 +35,12 @@ def member(e, m):
     within = stat_mean.series_mean(e.steady(m))
     mean, independent = e.mean[m], e.number("window_n_independent", m)
     low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
+    se, share = within.se, e.number("window_no_load_share", m)
+    if share > 0:
+        mean, se, low, high = at_least.AtLeast(mean, share), np.nan, np.nan, np.nan
     return {
         "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
-        "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
+        "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
         "independent": independent if np.isfinite(independent) else within.n_eff,
         "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
     }
@@ -149,6 +153,11 @@ def condition(e, c, members, options):
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
         "loads_left_out": left_out, "panels": loads.panels(e, rows)
     }
+    without = e.without_bound(c.members)
+    if without and len(rows):
+        out = at_least.condition(out, str(without), without.share, loads.bounded(out["loads"], without))
+    out["without_bound"] = {"share": without.share, "some": without.some, "ended": without.ended, "tows": without.tows,
+                            "words": without.words(named=True)}  # "" where there are none
     return out | {"design": statement.statement(e, rows, out)}
 
 
@@ -173,6 +182,8 @@ def sensitivity(e, members):
     Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be
     predicted.
     """
+    if without := e.without_bound(np.arange(e.n)):
+        return {"refused": f"means are lower bounds, {without}"}
     varied, y, of = sample(e, {m: members[m]["mean"] for m in e.used})
     if not varied or len(y) < 8:
         return {"refused": "nothing is varied" if not varied else f"{len(y)} {of}, needs 8"}
@@ -257,6 +268,8 @@ def csv_row(c, load_names):
            for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
                                                            for k, n in c["members"]["doubts"].items()}
     }
+    w = c["without_bound"]
+    row |= {"at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
     for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
                 "largest_share", "fields_needed"):
         row[key] = r.get(key)

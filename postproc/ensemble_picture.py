@@ -24,6 +24,10 @@ def headline(figure, e, subject):
     missing = e.n - len(e.used)
     if missing:
         words.append(f"{missing} failed, waiting or left out")
+    if without := e.without_bound(np.arange(e.n)):
+        some = {e.condition[e.name.index(name)] for name in [*without.some, *without.ended]}
+        words.append(f"at least these in {len(some)} of {len(np.unique(e.condition))} conditions: no load in "
+                     f"{100 * without.share:.2g} % of the steps, {len(without.ended)} tows ended for it")
     style.head(figure, f"{style.plain(e.title)}: {subject}", ", ".join(words))
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import at_least
 import soundness
 from bergtow_read import Run, RunError, least, within
 
@@ -93,6 +94,31 @@ def short_key(key):
     section, _, name = key.rpartition(".")
     plain = name.replace("_", " ")
     return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
+
+
+@dataclass(frozen=True)
+class WithoutBound:
+    """Tows of a condition in which nothing bounds the load in some steps, and those that ended for it."""
+
+    share: float    #: mean over the tows that finished of the share of such steps in their windows
+    some: list      #: names of those that hold such steps
+    ended: list     #: names of those that guard.no_solution ended, which are in no number
+    tows: int       #: of both kinds, and of all others
+
+    def __bool__(self):
+        return bool(self.some or self.ended)
+
+    def __str__(self):
+        return self.words()
+
+    def words(self, named=False):
+        """How many they are, and what share of the steps; named: with their names."""
+        some, ended = (f" ({listed(names)})" if named else "" for names in (self.some, self.ended))
+        parts = [f"the load of the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
+                 f"{100 * self.share:.2g} % of the steps of all that finished"] * bool(self.some)
+        parts += [f"{len(self.ended)} of {self.tows} tows ended for want of a solution (guard.no_solution) and are in "
+                  f"no number{ended}"] * bool(self.ended)
+        return "; ".join(parts)
 
 
 def _text(value):
@@ -241,7 +267,8 @@ class Ensemble:
         """(time s, values) of a series over a member's whole run; of steps without a load by bergtow_read.least."""
         time, x = (self._series[key][m] for key in ("time", name))
         there = np.isfinite(time)
-        return time[there], least(x[there])
+        x = x[there]
+        return time[there], least(x) if self.number("no_load_steps", m) > 0 else x
 
     def steady(self, m):
         """Ice resistance over the window of a member's tow, N; empty where there is none."""
@@ -424,6 +451,16 @@ class Ensemble:
         there = np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED)
         return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies
                          and (excluded or int(m) not in self._dropped)], dtype=int)
+
+    def without_bound(self, rows):
+        """WithoutBound of the conditions of these rows. Tows that are excluded, and those that ended for it, count:
+        without them the mean would be that of the tows which the ice let pass."""
+        tows = self.tows(rows)
+        shares = np.nan_to_num([self.number("window_no_load_share", m) for m in tows])
+        ended = [self.name[m] for m in np.flatnonzero(np.isin(self.condition, self.condition[rows])
+                                                      & (self.status == FAILED)) if at_least.ended(self.reason[m])]
+        return WithoutBound(float(shares.mean()) if len(tows) else np.nan,
+                            [self.name[m] for m, x in zip(tows, shares) if x > 0], ended, len(tows) + len(ended))
 
     def impacts(self, m):
         """Collisions of a member's tow in its window: (time s, peak N, its start s, hours, conversion), or None where

@@ -54,6 +54,11 @@ class Load:
     conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
 
 
+def filler(run):
+    """What makes a load of a series: of a run with steps without a solution `least`; NaN of another kind stays."""
+    return least if run.number("no_load_steps") > 0 else np.asarray
+
+
 def _floe_force(run):
     """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
     if not {"largest_push", "impact_peak"} <= set(run.series_names):
@@ -62,7 +67,7 @@ def _floe_force(run):
     if not (np.isfinite(push).any() and np.isfinite(peak).any()):
         return None
     conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
-    push = least(push)
+    push = filler(run)(push)
     return Load("floe_force", "force of one floe", run.units("largest_push"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
@@ -80,11 +85,11 @@ def _panel_load(run):
 
 def of_run(run):
     """[(Load, values)] of a run and the times of the values."""
-    out = []
+    out, filled = [], filler(run)
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
             out.append((Load(name, run.label(name), run.units(name), run.description(name),
-                             run.attribute(name, "needs")), least(run[name])))
+                             run.attribute(name, "needs")), filled(run[name])))
     return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
 
 
@@ -119,10 +124,17 @@ def cut_off(e, rows, load):
     """Why a load has no tail, "" where it may have one: steps without a solution, or lines that parted where that
     matters to it. Tows that are excluded count: those that are left are the ones that the line survived."""
     through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
-    if n := sum(e.number("window_no_load_share", m) > 0 for m in tows):
-        return f"the load of the body has no bound in some steps of {n} of {len(tows)} tows"
+    if without := e.without_bound(rows):
+        return str(without)
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
     return f"the line parted in {n} of {len(tows)} tows" if n else ""
+
+
+def bounded(found, without):
+    """Names of the loads of a condition that a line bounds, even in steps without a solution: tensions, and the tow
+    force where there are any. None of them where tows ended for it: which are left depends on their loads."""
+    tensions = {name for name, x in found.items() if x["needs"] in LINE}
+    return set() if without.ended or not tensions else tensions | {ALWAYS[0]}
 
 
 def in_window(e, m, time_scale):

@@ -222,7 +222,8 @@ def quantiles(s, markdown):
     for name in names(s):
         factor, unit, first = _unit(s, name)
         def cells(x, factor=factor, unit=unit, first=first):
-            return [first["label"], *("{} ({})".format(*estimate(x["quantiles"][str(q)], factor)) for q in SHOWN), unit]
+            cells = (estimate(x["quantiles"][str(q)], factor) for q in SHOWN)
+            return [first["label"], *(v if ends == "–" else f"{v} ({ends})" for v, ends in cells), unit]
         rows += _rows_of(s, name, cells)
     if not rows:
         return nothing(s)

@@ -3,6 +3,7 @@
 line tension where there is a line."""
 import statement
 import style
+from at_least import AtLeast
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -61,6 +62,10 @@ def draw(conditions, numeric, axis_label, times):
               markeredgewidth=2, zorder=3, label="largest simulated")
     axes.plot(x[there], [tows[k]["mean"] / factor for k in there], "o", color=style.ICE, markersize=5, zorder=3,
               label="mean tow force")
+    least = [k for k in there if isinstance(tows[k]["mean"], AtLeast)]
+    if least:
+        axes.plot(x[least], [tows[k]["largest"] / factor for k in least], "^", color=style.JAM, markersize=7, zorder=5,
+                  label="largest, at least")
     starts = [(k, tows[k]["start_up"]["largest"]) for k in there if statement.start_exceeds(tows[k])]
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,

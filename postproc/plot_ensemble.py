@@ -37,15 +37,17 @@ def draw_map(e, first, second):
     differ in the other parameters, and half the 95 % interval over it."""
     conditions = [c for c in e.conditions() if len(c.finished)]
     xs, ys = (sorted({c.values[k] for c in conditions}) for k in (first, second))
-    mean, width = (np.full((len(ys), len(xs)), np.nan) for _ in range(2))
+    mean, width, least = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
     most = 1
     for i, v in enumerate(ys):
         for j, u in enumerate(xs):
             cell = [dict(zip(e.seed[c.finished].tolist(), of(e, c.finished))) for c in conditions
                     if c.values[first] == u and c.values[second] == v]
+            least[i, j] = any(e.without_bound(c.members) for c in conditions
+                              if c.values[first] == u and c.values[second] == v)
             if cell:
                 mean[i, j], low, high = stat_mean.mean_of_conditions(cell)
-                width[i, j] = (high - low) / 2 / abs(mean[i, j]) if mean[i, j] else np.nan
+                width[i, j] = (high - low) / 2 / abs(mean[i, j]) if mean[i, j] and not least[i, j] else np.nan
                 most = max(most, len(cell))
     factor, unit = style.scale([np.nanmedian(mean)], "N")
     figure, axes = plt.subplots(1, 2, figsize=(12, 2.6 + 0.62 * len(ys)))
@@ -62,7 +64,7 @@ def draw_map(e, first, second):
             shade = image.norm(v) if np.isfinite(v) else 0
             ax.text(j + 0.5,
                     i + 0.5,
-                    texts(v) if np.isfinite(v) else "–",
+                    ("at least\n" if ax is axes[0] and least[i, j] else "") + texts(v) if np.isfinite(v) else "–",
                     ha="center",
                     va="center",
                     fontsize=9.5,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Loads around the hull by panel, and how often the peak of a collision is exceeded."""
-import command
+import command  # first: it has words for packages that are missing
+import at_least
 import style
 from bergtow_read import Run, RunError
 
@@ -110,7 +111,7 @@ def draw_exceedance(axes, run):
     peaks, rate = exceedance(hits["peak"][late], run.number("impacts.hours"))
     axes.set_xlabel(f"peak of a collision (N)\n{hits['conversion']}")
     axes.set_ylabel("exceeded (per hour)")
-    axes.set_title("How often a peak is exceeded", loc="left", fontsize=10.5)
+    axes.set_title("How often a peak is exceeded" + ", at least" * run.at_least, loc="left", fontsize=10.5)
     if not len(peaks) or peaks[0] <= 0:
         axes.annotate("no collisions in the window", (0.5, 0.5),
                       xycoords="axes fraction",
@@ -157,13 +158,15 @@ def draw(run):
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
     window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(
         panels["from"]) else "no window"
-    draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"mean load by panel, {window}")
+    least = "at least the " if run.at_least else ""  # panels count nothing in steps without a solution
+    draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"{least}mean load by panel, {window}")
     draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST,
-              "largest load in a step (impulse / time step)" + _start(panels, "max_load"))
+              f"{least}largest load in a step (impulse / time step)" + _start(panels, "max_load"))
     draw_hull(figure.add_subplot(grid[1, 0]), run, panels["max_peak"], PEAK,
-              f"largest peak of a collision, {run.impacts['conversion']}" + _start(panels, "max_peak"))
+              f"{least}largest peak of a collision, {run.impacts['conversion']}" + _start(panels, "max_peak"))
     draw_exceedance(figure.add_subplot(grid[1, 1]), run)
-    style.headline(figure, run, "ice loads on the hull")
+    words = f"ice loads on the hull ({at_least.words(run.number('window.no_load_share'))})"
+    style.headline(figure, run, words if run.at_least else "ice loads on the hull")
     return figure
 
 

@@ -10,7 +10,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import command
+import command  # first: it has words for packages that are missing
+import at_least
 import compared
 import stat_drift
 import style
@@ -31,7 +32,7 @@ class Point:
     title: str
     asked: float          #: ice.concentration, or as made where the case does not say
     concentration: float  #: as made
-    mean: float           #: N
+    mean: float           #: N, AtLeast where steps of its window have no solution
     se: float             #: standard error of the mean, N, NaN where the run gives none
     low: float            #: 95 % interval of the mean, N, NaN where the run gives none
     high: float
@@ -144,8 +145,11 @@ def rows(points):
                                       for p in some)
                             for name in names}
                            for what in ("valid", "compares"))
+        mean = at_least.of(means.mean(), [p.mean for p in some])
+        if isinstance(mean, at_least.AtLeast):
+            se = low = high = np.nan
         out.append({
-            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": means.mean(),
+            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
             "drift": stat_drift.of([p.change for p in some], means.mean()),
             "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
             "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
@@ -174,7 +178,9 @@ def table(points):
             cells.append(text + (f" ({row['mean'] / force:.3g})" if row["compares"].get(name) else ""))
         cells += [f"{100 * row['unconverged']:.2g} %", str(row["warnings"])]
         lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    shares = [f"{100 * row['concentration']:.3g} % ice: {at_least.words(row['mean'].share)}." for row in rows(points)
+              if isinstance(row["mean"], at_least.AtLeast)]
+    return "\n".join([*lines, "", *shares] if shares else lines)
 
 
 def words(points):
@@ -198,7 +204,8 @@ def words(points):
     for row in rows(points):
         factor, unit = scale([row["mean"]], "N")
         mean, low, high = (short(row[key] / factor) for key in ("mean", "low", "high"))
-        held = f" (95 %: {low} to {high})" if np.isfinite(row["low"]) else ""
+        held = f" (95 %: {low} to {high})" if np.isfinite(row["low"]) else \
+            f" ({at_least.words(row['mean'].share)})" if isinstance(row["mean"], at_least.AtLeast) else ""
         lines += [f"{100 * row['concentration']:.3g} % ice adds {mean} {unit}{held}, the mean of {row['runs']} "
                   f"tow{'s' if row['runs'] > 1 else ''}.", f"    Verdict: {verdict(row)}.",
                   f"    Estimates: {of(points[0].of_ice, row) or 'none is meant for this ice'}."]
@@ -290,6 +297,11 @@ def draw_runs(axes, points, factor, low, log):
         if which.any():
             axes.plot(a[which], mean[which] / factor, "o", color=style.ICE, markerfacecolor=face, markersize=4,
                       alpha=0.6, zorder=4, label=label)
+    least = [(p.concentration, p.mean / factor) for p in points
+             if isinstance(p.mean, at_least.AtLeast) and (p.mean > 0 or not log)]
+    if least:
+        axes.plot(*zip(*least), linestyle="none", marker="^", color=style.JAM, markersize=7, zorder=7,
+                  label="simulated, at least")
     if averaged:
         centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
         reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
@@ -336,6 +348,10 @@ def write_around(figure, points, lost, hidden):
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
     if hidden:
         notes.append(f"{hidden} run(s) without resistance not shown")
+    some = [p.mean.share for p in points if isinstance(p.mean, at_least.AtLeast)]
+    if some:
+        notes.append(f"{len(some)} run(s) at least this: in up to\n{100 * max(some):.2g} % of the steps the load\n"
+                     "has no bound")
     doubtful = sum(p.warnings > 0 for p in points)
     if doubtful:
         notes.append(f"{doubtful} of {len(points)} runs carry warnings")

@@ -79,7 +79,8 @@ def draw_fields(axes, e, some, key, factor, log_x):
     x = np.array([c.values[key] for c in some])
     half = width_of(x, log_x)
     means = [of(e, c.finished) for c in some]
-    band = np.array([stat_mean.t_interval(y) for y in means])
+    least = np.array([bool(e.without_bound(c.members)) for c in some])
+    band = np.where(least[:, None], np.nan, [stat_mean.t_interval(y) for y in means])
     for c, y in zip(some, means):
         at, order = spread(c.values[key], len(y), half, log_x), np.argsort(y)
         draw_members(axes, e, c.finished[order], at, y[order] / factor)
@@ -110,12 +111,15 @@ def draw_fields(axes, e, some, key, factor, log_x):
               color=style.INK,
               linestyle="none",
               zorder=6)
+    axes.plot(x[least], centre[least] / factor, "^", color=style.JAM, markersize=8, zorder=7)
 
 
 def fields_legend(e):
     """Handles and labels of draw_fields."""
     line = plt.Line2D
     field, *others = members_legend(e, "a field")
+    if e.without_bound(np.arange(e.n)):
+        others.append((line([], [], marker="^", color=style.JAM, linestyle="none", markersize=8), "mean, at least"))
     return [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), field,
             (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
                   markeredgewidth=2), "median of the fields"), *others]
@@ -254,7 +258,8 @@ def draw_sweep(e, key):
          if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
-            stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
+            stat_mean.t_interval(of(e, c.finished))[0] <= 0 and not e.without_bound(c.members)
+            for _, some in shown for c in some) else []))
     wide, height = figure.get_size_inches()
     note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
     lines, below = -(-len(pairs) // 3), 0.15 * max(0, len(note) - 1)

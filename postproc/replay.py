@@ -54,7 +54,7 @@ def read_frames(run, frames, floes):
         pose = run.pose(frame)[floes]
         pose[:, :2] = run.wrap(pose[:, :2])
         out[0, k], out[1, k], out[2, k] = pose.T
-        out[3, k], out[4, k] = run.speed(frame)[floes], run.contact_force(frame)[floes]
+        out[3, k], out[4, k] = run.speed(frame)[floes], run.least_contact_force(frame)[floes]
     if not np.isfinite(out).all():
         raise RunError(run.result, "/frames holds values that are not finite",
                        "the file is damaged: run the case again")
@@ -289,6 +289,7 @@ def curve(run):
     out["window"] = list(run.window) if run.window else None
     mean, low, high = run.interval("ice_resistance")
     out["window_name"] = run.window_name
+    out["at_least"] = run.at_least
     out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float(
         (high - low) / 2) if np.isfinite(high - low) else None)
     out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.events]

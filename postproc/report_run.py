@@ -10,6 +10,7 @@ import plot_resistance
 import report_case
 import style
 import vector
+from at_least import AtLeast
 from bergtow_read import RunError
 from replay import LIMIT, Replay
 
@@ -161,8 +162,9 @@ def forces(run):
             continue
         known = re.fullmatch(r"mean_(.*)_n", key)
         value, interval = with_interval(*run.interval(known[1])) if known else (force(mean), "–")
-        rows.append(
-            (f"{run.label(name)}, {run.mean_name}", value, interval if interval != "–" else "", run.description(name)))
+        bounded = run.at_least and not isinstance(mean, AtLeast)  # drag, inertia
+        rows.append((f"{run.label(name)}, {'mean over the window' if bounded else run.mean_name}", value,
+                     interval if interval != "–" else "", run.description(name)))
     quarters = ((run.summary.get("window") or {}).get("series") or {}).get("ice_resistance", {}).get("quarters_n")
     if quarters:
         rows.append(("ice resistance by quarters of the window", ", ".join(force(q) for q in quarters), "", ""))
@@ -255,7 +257,8 @@ def quality(run):
              ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm",
               f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size"
               if np.isfinite(n("max_overlap_relative")) else ""),
-             ("contact work", f"{style.short(n('contact_work_j'))} J",
+             ("contact work",
+              f"{style.short(n('contact_work_j'))} J" if np.isfinite(n("contact_work_j")) else "–",
               f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
     if n("crushing_steps", 0):
         rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J",

@@ -53,7 +53,7 @@ class Colouring:
     def _raw(self, frame):
         if self.kind == "thickness":
             return self.run.thickness
-        return self.run.speed(frame) if self.kind == "speed" else self.run.contact_force(frame)
+        return self.run.speed(frame) if self.kind == "speed" else self.run.least_contact_force(frame)
 
     def values(self, frame):
         """[N] in the units of the label."""

@@ -29,7 +29,6 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (ensemble_read.DOUBTS) that concern the value
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
-    "unbounded": "members whose load has no bound in some steps, so that theirs are lower bounds",
     "unsteady": "members whose window is not steady",
     "short": "members with fewer than 20 independent samples",
     "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
@@ -338,6 +337,10 @@ def statement(e, rows, c):
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, case, lines) + warned
+    if c["without_bound"]["words"]:
+        warned = [("means, peaks and quantiles are at least those given, and there is no design value, since nothing "
+                   "bounds some loads: let ice give way (ice.rafting.kappa, ice.crushing.pressure)",
+                   c["without_bound"]["words"])] + warned
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],

@@ -2,6 +2,8 @@
 """Tables of text or Markdown, and how numbers stand in them."""
 import numpy as np
 
+from at_least import AtLeast
+
 FAR = 10.0  # times a level: an end beyond bounds nothing
 
 
@@ -39,6 +41,8 @@ def short(value, digits=3):
     """A number to so many significant digits, without exponent where that can be avoided."""
     if value == 0 or not np.isfinite(value):
         return f"{value:g}"
+    if isinstance(value, AtLeast):
+        return f"at least {short(float(value), digits)}"
     value = float(f"{value:.{digits - 1}e}")  # 99.96 has as many digits as 100
     decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
     return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"

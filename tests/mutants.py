@@ -230,6 +230,10 @@ MUTANTS = {
     "src/solve/locked.c": (["cli/test_locked.py::test_bodies_that_cannot_give_way",
                             "cli/test_locked.py::test_a_wedge_below_its_angle_of_friction_has_no_load",
                             "cli/test_locked.py::test_a_wedge_above_it_is_not_locked_when_work_is_short",
+                            "cli/test_locked.py::test_a_wedge_that_is_dragged_out_is_not_locked",
+                            "cli/test_locked.py::"
+                            "test_friction_proves_nothing_of_loads_that_the_sweeps_have_not_come_to",
+                            "cli/test_locked.py::test_a_lock_below_the_tolerance_is_none_beside_a_jam_either",
                             "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
          "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
@@ -239,6 +243,11 @@ MUTANTS = {
          "nothing is ever locked"),
         ("held < 2 && !lock.towed", "held < 1 && !lock.towed", "friction holds nothing"),
         ("        u->mu *= BT_LOCKED_STICKS;\n", "", "loads of the proof go to the rim of their cones"),
+        ("if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu", "if (!held) u->mu",
+         "friction of contacts that slide holds"),
+        ("    if (held) keep_near(w, s, &l);", "    if (held && false) keep_near(w, s, &l);",
+         "loads of the proof need not be those of the sweeps"),
+        ("    keep_above(w, s, w->par.tolerance);\n", "", "what passes for rest is locked"),
     ]),
     "src/solve/project.c": (PROJECT, [
         ("g->gap[i] += w->par.dt * ", "if (w->par.dt < 0) g->gap[i] += w->par.dt * ", "overlap of the start"),

@@ -73,6 +73,10 @@ def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             continue
         error = summary.get(name.removesuffix("_n") + "_se_n")
         text = f"{value:.4g}" if isinstance(value, float) else str(value)
+        if (summary.get("window") or {}).get("at_least") and (
+                name.endswith("ice_resistance_n") or name.endswith("tow_force_n") and
+                summary.get("mean_line_tension_n") is None):
+            text = f"at least {text}"
         yield html.escape(name), html.escape(text + (f" ± {error:.2g}" if error else ""))
     for warning in summary.get("warnings", []):
         yield "warning", html.escape(str(warning["text"]))

@@ -122,6 +122,12 @@ function drawChart() {
         g.lineTo(s.x(curve.window[1]), s.y(curve.mean));
         g.stroke();
         g.setLineDash([]);
+        if (curve.at_least) {
+            g.fillStyle = colour("--warn");
+            g.textAlign = "right";
+            g.textBaseline = "bottom";
+            g.fillText("mean at least this", s.x(curve.window[1]), s.y(curve.mean) - 2 * ratio);
+        }
     }
     g.restore();
     if (range.beyond !== null) {

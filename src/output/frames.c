@@ -171,12 +171,12 @@ static void create_datasets(bt_frames *f)
     bt_h5_describe(h, "/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe");
     bt_h5_describe(h, "/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies");
     bt_h5_describe(h, "/frames/contact_force", "time floe", "N",
-                   "largest normal contact force on the floe in the step");
+                   "largest normal contact force on the floe in the step, NaN where that has no solution");
     bt_h5_describe(h, "/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies");
     bt_h5_describe(h, "/frames/velocity", "time floe_or_body xy", "m/s",
                    "velocity of the centroid: floes, then /bodies");
     bt_h5_describe(h, "/frames/net_force", "time floe_or_body xy", "N",
-                   "sum of all contact forces in the step: floes, then /bodies");
+                   "sum of all contact forces in the step, NaN where that has no solution: floes, then /bodies");
     if (!f->branches) return;
     const hsize_t k = (hsize_t)f->branches;
     f->line_points = bt_h5_growing(h, "/frames/line_points", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){2 * k, 2},

@@ -139,6 +139,8 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     double (*net)[2] = bt_alloc((size_t)b->n, sizeof *net);
     bt_observe_contact_force(w, force);
     bt_observe_net_force(c, w, roster->n_free, net);
+    if (w->stats.locked) // the contacts of this step have no solution
+        for (bt_idx i = 0; i < b->n; i++) force[i] = net[i][0] = net[i][1] = NAN;
     list l = make_list(c, w, roster);
     const bool alone = c->size == 1; // all bodies are of one block: each row is put where it belongs
     bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);

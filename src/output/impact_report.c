@@ -44,23 +44,23 @@ void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c
     free(peaks);
 }
 
-void bt_impacts_print(const bt_impact_count *c)
+void bt_impacts_print(const bt_impact_count *c, bool at_least)
 {
     if (!c || !(c->hours > 0)) return;
     char a[32], b[32];
-    printf(
-        "  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, quasi-static "
-        "%s\n",
-        (long long)c->n, c->start, (double)c->n / c->hours, bt_force_text(a, c->collision_resistance),
-        bt_force_text(b, c->push_resistance));
+    const char *least = at_least ? "at least " : "";
+    printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s%s of the mean resistance, ",
+           (long long)c->n, c->start, (double)c->n / c->hours, least, bt_force_text(a, c->collision_resistance));
+    if (at_least) printf("the quasi-static rest has no bound\n");
+    else printf("quasi-static %s\n", bt_force_text(b, c->push_resistance));
     if (c->n > 0) {
-        printf("    peaks (%s)", c->conversion);
+        printf("    peaks%s (%s)", at_least ? ", at least" : "", c->conversion);
         double *peaks = sorted(c);
         // A few of the ranks: the largest, then tenfold.
         for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
             printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]),
                    (double)rank_of(k) / c->hours);
-        printf("; largest quasi-static load %s\n", bt_force_text(a, c->largest_push));
+        printf("; largest quasi-static load %s%s\n", least, bt_force_text(a, c->largest_push));
         free(peaks);
     }
     if (c->n_all > c->n)

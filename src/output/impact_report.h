@@ -8,7 +8,7 @@
 
 /// An array of ranks, each with its peak and how often that is reached or exceeded.
 void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c);
-/// Two lines of the printed table; nothing when c is NULL.
-void bt_impacts_print(const bt_impact_count *c);
+/// Two lines of the printed table; nothing when c is NULL. at_least: the loads are lower bounds.
+void bt_impacts_print(const bt_impact_count *c, bool at_least);
 
 #endif

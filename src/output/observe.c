@@ -230,6 +230,7 @@ void bt_observe(bt_world *w, double reference_speed, bt_sample *s)
         s->window_waiting = (double)w->window->waiting;
     }
     observe_rows(w, has, s);
+    if (w->stats.locked) s->contact_work = NAN; // by loads that are none
     if (w->stats.no_load) bt_sample_lose_load(s, !bt_tow_has_line(w->tow) && w->tow->mode == BT_TOW_SPEED);
 }
 

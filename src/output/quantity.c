@@ -100,6 +100,7 @@ const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)
         const bt_quantity *q = bt_series(k);
         const double x = bt_sample_value(s, q);
         if (s->no_load != 0 && isnan(x) && is_load(q)) continue;
+        if (s->locked != 0 && isnan(x) && q->offset == offsetof(bt_sample, contact_work)) continue;
         if (has & 1u << q->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return q;
     }
     return NULL;

@@ -216,8 +216,8 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     const double speed = t->tolerance / c->solver.tolerance;
     if (s->at_least)
         bt_warn(because(s, BT_NOT_STEADY), BT_WARN_NO_LOAD,
-                "%.3g %% of the steps in the window have no solution that bounds the load of the body, so its means, "
-                "percentiles and peaks are lower bounds: let ice give way, or do not use them",
+                "%.3g %% of the steps in the window have no solution, so the loads of the body are at least those "
+                "given: let ice give way (ice.rafting.kappa, ice.crushing.pressure), or do not use them",
                 100 * s->no_load);
     if (s->unconverged > BT_STEADY_UNCONVERGED)
         bt_warn(because(s, BT_NOT_STEADY), BT_WARN_UNCONVERGED_SHARE,

@@ -108,7 +108,7 @@ static void print_forces(const bt_summary *s, const bt_case *c)
         printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
                bt_case_reads_field(c) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
-    printf("    quarters          %s,", bt_force_text(a, quarter[0]));
+    printf("    quarters          %s%s,", w->at_least ? "at least: " : "", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
     printf("    step means        %s95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n",
            w->at_least ? "at least: " : "", bt_force_text(a, s->p95),
@@ -116,8 +116,9 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     if (w->series[BT_REPORTED_ICE].start_peak > s->peak)
         printf("      start           the largest, %s, lies before the window\n",
                bt_force_text(a, w->series[BT_REPORTED_ICE].start_peak));
-    printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, s->balance),
-           bt_balance_words(), bt_force_text(b, s->budget.mean));
+    if (!w->at_least) // neither balance is one of numbers
+        printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, s->balance),
+               bt_balance_words(), bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow, w->at_least && c->tow.mode == BT_TOW_SPEED);
     printf("    drag              %s\n", bt_force_text(a, s->drag.mean));
     print_added(s, true);
@@ -154,7 +155,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
         printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split,
                (long long)o->parts);
     if (s->body) print_forces(s, c);
-    bt_impacts_print(s->impacts);
+    bt_impacts_print(s->impacts, s->window.at_least);
     if (s->body && !isnan(s->estimate.along)) {
         const bt_estimate_input *in = &s->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
@@ -171,7 +172,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     print_events(t->events);
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
            t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
-    printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);
+    printf("  momentum residual   %.2g; ", h->max_momentum_residual);
+    if (isnan(h->contact_work)) printf("contact work is no number, since some steps have no solution\n");
+    else printf("contact work %.4g J\n", h->contact_work);
     for (int law = 0; law < BT_LAWS; law++) {
         char *line =
             bt_laws[law]->result ? bt_laws[law]->result(c, h->laws + bt_law_first_total(law), t->ice_area) : NULL;

@@ -20,6 +20,7 @@ from resuming import done
 sys.path.insert(0, str(ROOT / "postproc"))
 import bergtow_read  # noqa: E402
 import loads  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
 
 A = 1.0
 TOWED = {
@@ -63,9 +64,7 @@ def test_a_lock_below_the_tolerance_is_not_silent(tmp_path):
     """Walls close by 0.4 mm/s on a full row of 18 squares: a contact by 0.04 mm/s, which passes for rest. Red without a
     word. With the tolerance that is asked for the steps are locked."""
     case = changed(TOWED, run__duration=120, domain__width=18, domain__sides_closing=4e-4, body={"shape": "none"},
-                   tow={"mode": "none"}, output=None, ice__concentration=0, floes=[
-                       {"shape": "rectangle", "length": A, "width": A, "x": 6, "y": k - 8.5, "thickness": 0.3}
-                       for k in range(18)], solver={"reference_speed": 0.5})
+                   tow={"mode": "none"}, output=None, floes=column(), solver={"reference_speed": 0.5})
     r = run(tmp_path, case, name="a")
     said = warned(r, "domain.sides_closing: 0.0004 m/s, shared out among the contacts of some 16 floes")
     assert said and warned(r, "the position projection met its limit of work") and r.summary["unprojected_steps"] > 0
@@ -73,6 +72,23 @@ def test_a_lock_below_the_tolerance_is_not_silent(tmp_path):
     case["solver"]["tolerance"] = float(said[0].rsplit(" ", 1)[1])
     locked = run(tmp_path, changed(case, run__duration=1), name="b")
     assert locked.summary["locked_steps"] > 5 and not warned(locked, "takes .* for rest")
+
+
+def column():
+    """A row of squares from wall to wall of a domain 18 m wide."""
+    return [{"shape": "rectangle", "length": A, "width": A, "x": 6, "y": k - 8.5, "thickness": 0.3} for k in range(18)]
+
+
+@pytest.mark.parametrize("sweeps, short", [(1, True), (5, False)])
+def test_a_lock_below_the_tolerance_is_none_beside_a_jam_either(tmp_path, sweeps, short):
+    """A heavy floe runs into others far from such a row. Red when the proof is held against what passes for rest once
+    anything else wants more work."""
+    others = [{"shape": "rectangle", "length": A, "width": A, "x": 9 + k, "y": 0.3 * (k % 2),
+               "thickness": 3 if k else 9, "vx": 0 if k else 0.3} for k in range(8)]
+    r = run(tmp_path, changed(TOWED, domain__length=24, domain__width=18, domain__sides_closing=4e-4,
+                              body={"shape": "none"}, tow={"mode": "none"}, output=None, floes=column() + others,
+                              solver={"reference_speed": 0.5, "max_sweeps": sweeps}))
+    assert (r.summary["unconverged_steps"] > 0) == short and r.summary["locked_steps"] == 0
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -199,6 +215,25 @@ def test_a_wedge_above_it_is_not_locked_when_work_is_short(tmp_path, above, swee
     assert above > 1e-2 or r.summary["unconverged_steps"] > 0
 
 
+@pytest.mark.parametrize("half, share, sweeps", [(0.1, 0.9, 2), (0.1, 0.6, 2), (0.1, 0.3, 3), (0.17, 0.9, 1)])
+def test_a_wedge_that_is_dragged_out_is_not_locked(tmp_path, half, share, sweeps):
+    """Below its angle of friction, under a body that goes aside faster than it comes down: its friction drags the wedge
+    out, and 50 sweeps find the load. Red when friction of contacts that slide is taken for one that holds."""
+    case = wedge(half, tow__direction=-np.degrees(share * half), run__duration=0.5)
+    short, enough = (run(tmp_path, changed(case, solver={"max_sweeps": n}), name=f"n{n}") for n in (sweeps, 50))
+    assert enough.summary["unconverged_steps"] == 0 and short.summary["unconverged_steps"] > 0
+    assert short.summary["locked_steps"] == 0
+
+
+def test_friction_proves_nothing_of_loads_that_the_sweeps_have_not_come_to(tmp_path):
+    """One sweep is far from the loads that balance each other, and another solution may be as near. Red when such a
+    step counts as locked all the same."""
+    case = wedge(0.15, tow__direction=0, tow__speed=0.05, ice__friction=2, body__friction=2, run__duration=0.1)
+    one, many = (run(tmp_path, changed(case, solver={"max_sweeps": n}), name=f"n{n}") for n in (1, 500))
+    assert one.summary["unconverged_steps"] == many.summary["unconverged_steps"] == 1
+    assert one.summary["locked_steps"] == 0 and many.summary["locked_steps"] == 1
+
+
 def test_a_line_pulls_as_hard_as_it_does(tmp_path):
     """A body on a stiff line presses a floe against fixed ice with up to 1e9 N: EA/L times what the end has gone on
     since."""
@@ -273,7 +308,8 @@ def test_a_closed_box_locks(tmp_path, friction):
 
 def test_locks_are_the_same_on_ranks_and_after_a_resume(tmp_path):
     """Red when loads without a number are refused in a checkpoint, or ranks prove different things."""
-    write_case(tmp_path, jam(1, 0.9, output={"window_start": 0, "panels": True, "sample_every": 2}))
+    write_case(tmp_path, jam(1, 0.9, output={"window_start": 0, "panels": True, "sample_every": 2,
+                                                "frame_interval": 0.1}))
     done(1, "run", tmp_path / "case.yml", "-o", tmp_path / "whole", "--quiet")
     whole = Run(tmp_path / "whole", None)
     assert whole.summary["no_load_steps"] > 3
@@ -284,7 +320,8 @@ def test_locks_are_the_same_on_ranks_and_after_a_resume(tmp_path):
         other = Run(tmp_path / name, None)
         assert other.hash == whole.hash and other.summary["no_load_steps"] == whole.summary["no_load_steps"]
         assert other.summary["window"] == whole.summary["window"]
-        assert not [n for n in differing(tmp_path / "whole/result.h5", tmp_path / name / "result.h5") if "series" in n]
+        assert not [n for n in differing(tmp_path / "whole/result.h5", tmp_path / name / "result.h5")
+                    if "series" in n or "frames" in n]
 
 
 # ---- readers
@@ -296,8 +333,10 @@ def test_a_load_that_is_no_number_counts_as_the_last_one():
 
 
 def test_a_tow_without_a_load_has_no_tail():
-    share = [0.0, 0.2, np.nan]
-    e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [])
+    share, none = [0.0, 0.2, np.nan], np.zeros(3, int)
+    e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [], condition=none,
+                        status=none, name=list("abc"))
+    e.without_bound = lambda rows: Ensemble.without_bound(e, rows)
     load = SimpleNamespace(name="ice_resistance", needs="")
     assert "no bound in some steps of 1 of 3 tows" in loads.cut_off(e, [0, 1, 2], load)
     assert loads.cut_off(e, [0, 2], load) == ""

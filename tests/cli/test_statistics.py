@@ -226,7 +226,7 @@ def test_which_parameter_matters(plain):
 class Hypercube:
     """Conditions whose means no parameter explains, with fields that scatter little."""
 
-    sampled = True
+    sampled, n = True, 0
 
     def __init__(self, n, fields, rng):
         self.used = np.arange(n * fields)
@@ -236,6 +236,9 @@ class Hypercube:
 
     def conditions(self):
         return [SimpleNamespace(finished=rows) for rows in self.rows]
+
+    def without_bound(self, rows):
+        return None
 
 
 @pytest.mark.parametrize("n, fields", [(10, 8), (32, 2)])
