@@ -82,7 +82,7 @@ int bt_cmd_field(int argc, char **argv)
                  : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
     if (status == BT_OK) status = bt_cmd_may_write(o.output, o.file.path, ours, o.force, &err);
     double start = bt_clock();
-    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
+    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_floes_made(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK)
         status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err)
