@@ -100,6 +100,9 @@ int bt_cmd_field(int argc, char **argv)
         const bt_field_sizes sizes = bt_field_sizes_of(&c, &f);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
                f.concentration, f.ice_area, sizes.mean, bt_case_reads_field(&c) ? "read" : "made", took);
+        if (f.strip > 0)
+            printf("  cut from a larger extent: floes within %.4g m of the cut, or across it, are those of this region "
+                   "alone\n", f.strip);
         bt_outline_warn(&f.outlines, &c, &warnings);
         bt_field_size_warn(&c, &sizes, &warnings);
     }

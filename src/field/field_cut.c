@@ -7,10 +7,10 @@
 // the wall, and at a periodic seam 2c from the part at the other end, with which it no longer makes one floe. Convex
 // stays convex. A part of less than LEAST_PART of its floe is left out. So nothing overlaps, whatever the boundaries.
 //
-// A part of a field has not its concentration to the last digit: n floes of c A area leave Σ area a scatter (theory.md
-// has it measured). Floes whose centroid is within the strip of width s of a cut side, and those that were cut, are
+// A part of a field has another concentration than the whole (theory.md has the scatter measured). Floes whose centroid is within the strip of width s of a cut side, and those that were cut, are
 // scaled about their centroids by one factor, as far as each has room, until Σ area = concentration × ice area. s is
-// one mean diameter, or as many more as it takes for areas to change by no more than MOST_CHANGE.
+// one mean diameter, or as many more as it takes for areas to change by no more than MOST_CHANGE; in the widest strip
+// they may by LAST_CHANGE, which small domains of few floes need.
 //
 // Rejected: floes taken out or put in at random, of whole floes, which leaves the half of a floe; all floes scaled,
 // which leaves no floe that two widths have in common; another shake of the strip, in which some floes would go.
@@ -24,10 +24,12 @@
 
 static const double LEAST_PART = 0.1;   // of a floe's area
 static const double SHORT_EDGE = 0.02;  // of the diameter of a part
-static const double MOST_CHANGE = 0.25; // of a floe's area in the strip
+static const double MOST_CHANGE = 0.25; // of a floe's area in the strip, as long as that can be widened
+static const double LAST_CHANGE = 0.5;  // in the widest strip
 static const double WIDEST = 0.25;      // of the ice region across a cut: more than half of it is left as it is
 static const double TOLERANCE = 0.005;  // of the concentration
-static const double TOUCH = 1 - 1e-9;
+static const double TOUCH = 1 - 1e-9, ROUND_OFF = 1e-12;
+enum { MORE_PASSES = 20 };
 
 /// One axis of a cut: where the ice region begins and ends, and which of the two the extent reaches beyond.
 typedef struct axis {
@@ -128,25 +130,42 @@ static double to_cut(const axis a[2], const double *at)
     return least;
 }
 
+/// How much each floe may be scaled, but for those held, so that none touches another and no area has changed by more
+/// than `change` from what it was.
+static void room_of(const bt_region *y, const bt_field *f, const double *first, double change, double *clearance)
+{
+    bt_field_growth(y, f, sqrt(1 + change), clearance);
+    for (bt_idx i = 0; i < f->n; i++)
+        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / f->area[i]));
+}
+
 /// Scale the floes of the strip; the area reached, m².
 static double scale_strip(const bt_region *y, const axis a[2], const bool *parted, double size, double wanted,
                           bt_field *f)
 {
-    const double least = 1 - MOST_CHANGE, most = 1 + MOST_CHANGE;
-    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance), room = INFINITY, area;
+    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance), *first = bt_alloc((size_t)f->n, sizeof *first),
+           widest = INFINITY, area = bt_field_floe_area(f);
     bool *held = bt_alloc((size_t)f->n, sizeof *held);
-    bt_field_growth(y, f, sqrt(most), clearance);
-    for (bt_idx i = 0; i < f->n; i++) clearance[i] *= TOUCH;
+    memcpy(first, f->area, (size_t)f->n * sizeof *first);
     for (int k = 0; k < 2; k++)
-        if (a[k].at_low || a[k].at_high) room = bt_min(room, WIDEST * (a[k].high - a[k].low));
-    for (f->strip = bt_min(size, room);; f->strip = bt_min(f->strip + size, room)) {
+        if (a[k].at_low || a[k].at_high) widest = bt_min(widest, WIDEST * (a[k].high - a[k].low));
+    room_of(y, f, first, LAST_CHANGE, clearance);
+    for (f->strip = bt_min(size, widest);; f->strip = bt_min(f->strip + size, widest)) {
         for (bt_idx i = 0; i < f->n; i++) held[i] = !parted[i] && !(to_cut(a, f->pose + 3 * i) < f->strip);
-        const double low = bt_field_area_at(f, clearance, held, least), high = bt_field_area_at(f, clearance, held, most);
-        if ((low <= wanted && wanted <= high) || f->strip == room) {
-            area = bt_field_fit(f, clearance, held, bt_max(low, bt_min(high, wanted)));
+        const double change = f->strip < widest ? MOST_CHANGE : LAST_CHANGE,
+                     low = bt_field_area_at(f, clearance, held, 1 - change),
+                     high = bt_field_area_at(f, clearance, held, 1 + change);
+        if ((low <= wanted && wanted <= high) || f->strip == widest) {
+            area = bt_field_fit(f, clearance, held, bt_max(low, wanted));
             break;
         }
     }
+    // What one neighbour does not take of the gap between two, the other may.
+    for (int pass = 0; pass < MORE_PASSES && area < (1 - ROUND_OFF) * wanted; pass++) {
+        room_of(y, f, first, LAST_CHANGE, clearance);
+        area = bt_field_fit(f, clearance, held, wanted);
+    }
+    free(first);
     free(clearance);
     free(held);
     return area;
