@@ -65,7 +65,7 @@ def doubtful(found):
 
 def text(found, markdown=False):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
-    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what it is "
-            f"of the error that other ice for each value would leave. What is below "
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
+            "it is of the error that other ice for each value would leave. What is below "
             f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return doubtful(found) + table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note

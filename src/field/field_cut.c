@@ -7,10 +7,11 @@
 // the wall, and at a periodic seam 2c from the part at the other end, with which it no longer makes one floe. Convex
 // stays convex. A part of less than LEAST_PART of its floe is left out. So nothing overlaps, whatever the boundaries.
 //
-// A part of a field has another concentration than the whole (theory.md has the scatter measured). Floes whose centroid is within the strip of width s of a cut side, and those that were cut, are
-// scaled about their centroids by one factor, as far as each has room, until Σ area = concentration × ice area. s is
-// one mean diameter, or as many more as it takes for areas to change by no more than MOST_CHANGE; in the widest strip
-// they may by LAST_CHANGE, which small domains of few floes need.
+// A part of a field has another concentration than the whole (theory.md has the scatter measured). Floes whose centroid
+// is within the strip of width s of a cut side, and those that were cut, are scaled about their centroids by one
+// factor, as far as each has room, until Σ area = concentration × ice area. s is one mean diameter, or as many more as
+// it takes for areas to change by no more than MOST_CHANGE; in the widest strip they may by LAST_CHANGE, which small
+// domains of few floes need.
 //
 // Rejected: floes taken out or put in at random, of whole floes, which leaves the half of a floe; all floes scaled,
 // which leaves no floe that two widths have in common; another shake of the strip, in which some floes would go.

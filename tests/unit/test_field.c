@@ -682,7 +682,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_add),         cmocka_unit_test(test_voronoi),
         cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),  cmocka_unit_test(test_surroundings),
-        cmocka_unit_test(test_cut),         cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
+        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
         cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),   cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_laws_of_a_program),
