@@ -423,7 +423,24 @@ static void test_cut(void **state)
     assert_shares(&wide, c, "rectangles");
     c.ice.shape = wide.ice.shape = BT_ICE_POLYGONS, c.ice.concentration = wide.ice.concentration = 0.6;
     assert_shares(&wide, c, "hexagons");
+    // Ice up to both ends of a period, where floes of the extent lie across its own seam, and no slivers. Red without
+    // the images of the extent (-40 % there), or with all parts kept.
+    c = basin();
+    c.domain.ends = BT_BOUND_PERIODIC, c.body.shape = BT_BODY_ABSENT;
+    c.ice.size_spread = 0, c.ice.concentration = 0.9, c.ice.extent_x_max = 50;
+    bt_field p = made(&c);
+    double ends = 0, smallest = INFINITY, out[2 * BT_MAX_VERTICES + 2], at[2 * BT_MAX_VERTICES + 2];
+    for (bt_idx i = 0; i < p.n; i++) {
+        const polygon q = in_place(&p, i);
+        const int low = bt_shape_clip(q.n, q.v, 1, 0, 0.4, out), high = bt_shape_clip(q.n, q.v, -1, 0, -35.6, at);
+        ends += (low >= 3 ? bt_shape_moments(low, out).area : 0) + (high >= 3 ? bt_shape_moments(high, at).area : 0);
+        smallest = fmin(smallest, p.area[i]);
+    }
+    assert_true(fabs(ends / (0.9 * 0.8 * 10) - 1) < 0.12);
+    assert_true(smallest > 0.05 * BT_PI / 4);
+    bt_field_free(&p);
     // an extent that is the ice region changes no bit
+    c = basin();
     bt_field f = made(&c);
     c.ice.extent_x_min = 0, c.ice.extent_x_max = 36, c.ice.extent_y_min = -5, c.ice.extent_y_max = 5;
     bt_field g = made(&c);
