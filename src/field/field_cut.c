@@ -109,7 +109,8 @@ static void add_part(const bt_region *y, const axis a[2], const bt_field *from, 
         bt_field_append(to, from, i);
         to->pose[3 * k] = x, to->pose[3 * k + 1] = z;
     } else {
-        bt_moments m = n < 3 ? (bt_moments){0} : bt_shape_extent(n, v);
+        bt_moments m = {0};
+        if (n >= 3) m = bt_shape_extent(n, v);
         if (m.area < LEAST_PART * from->area[i]) return;
         n = bt_tessellation_clean(n, v, SHORT_EDGE * 2 * sqrt(m.area / BT_PI), BT_MAX_VERTICES);
         m = bt_shape_centre(n, v);
