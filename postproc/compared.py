@@ -18,7 +18,8 @@ KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length",
 WINDOW = 0.01  # of its length: ends of a window fall on steps
 #: what makes another case of it; not where the domain lies, which goes with its size
 PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "lead.", "domain.ends", "domain.sides", "domain.wall_")
-PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "body.x", "body.y", "tow.ramp")
+PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "ice.extent.x_min",
+          "ice.extent.x_max", "ice.extent.y_min", "ice.extent.y_max", "body.x", "body.y", "tow.ramp")
 
 
 def cases(e):

@@ -4,9 +4,11 @@ tolerance, the window, the start, the number of fields?
 
     converge.py CASE.yml -o DIR --budget 10        DIR/converge.json, DIR/converge/NAME/fNNN, a verdict a line
 
-One value is changed at a time, and the case is run with it and without it on the same seeds, so that Δt and
-tolerance are compared on the same ice. (Another extent is another field, whatever its seed.) The effect is that on a
-mean over fields, relative to it; its interval is the jackknife over pairs (stat_load.py). Two need no other run: the
+One value is changed at a time, and the case is run with it and without it on the same seeds, so that both are
+compared on the same ice. For a width or length the field of the smaller domain is that of the larger one, cut to it
+(ice.extent): they share all floes but those of a strip. What that is worth stands in the table: the error of the
+effect / that which fields of their own would leave, from the scatter of either. The effect is that on a mean over
+fields, relative to it; its interval is the jackknife over pairs (stat_load.py). Two need no other run: the
 second half of the window against all of it, and the largest tow force of the start-up against the largest of the
 window, which it should not exceed; where it does, the ramp is made longer. Fields are added, in LOOKS looks, until
 
@@ -99,6 +101,28 @@ def wider(run, k):
         run, {"ice.y_min": (y0, centre - width / 2), "ice.y_max": (y0 + before, centre + width / 2)})
 
 
+def cut_from(run, larger):
+    """Keys with which the field of a domain is cut from that of a larger one, of these values: the ice region's ends
+    that move. {} where the ice is not made.
+
+    The smaller domain is run once more for it: its own field is another, and so would be that cut from a still larger
+    domain. Rejected: the largest domain of all tries as the extent of each, eight times the ice of the case to be made
+    for a comparison that mostly ends with the first try."""
+    if run.case.get("ice.field", "none") != "none" or run.case.get("ice.outlines", "none") != "none" or not (
+            run.value("ice.concentration") > 0):
+        return {}
+    out = {}
+    for axis, size in (("x", "length"), ("y", "width")):
+        x0, extent = run.value(f"domain.{axis}0"), run.value(f"domain.{size}")
+        low = larger.get(f"domain.{axis}0", x0)
+        high = low + larger.get(f"domain.{size}", extent)
+        for end, now, then in (("min", x0, low), ("max", x0 + extent, high)):
+            key = f"ice.{axis}_{end}"
+            if now != then and np.isclose(run.value(key), now, rtol=0, atol=1e-9 * extent):
+                out[f"ice.extent.{axis}_{end}"] = larger.get(key, then)
+    return out
+
+
 def mean_resistance(run):
     """NaN where the tow ends within the window, since what comes after is no resistance to a tow, and where steps of it
     have no solution: two lower bounds cannot be compared."""
@@ -148,6 +172,13 @@ def effect(base, other, looks=LOOKS):
     return float(value) - 1, (float(back(there(value) - half)) - 1, float(back(there(value) + half)) - 1)
 
 
+def pairing(base, other):
+    """Error of the effect / that which two independent samples of this scatter would leave; None where it is none."""
+    a, b = base / base.mean(), other / other.mean()
+    alone = np.var(a, ddof=1) + np.var(b, ddof=1)
+    return float(np.sqrt(np.var(b - a, ddof=1) / alone)) if np.isfinite(alone) and alone > 0 else None
+
+
 def judged(interval, margin, one_sided=False):
     """"none", "matters" or "open". one_sided: only what is above zero matters."""
     low, high = interval
@@ -168,7 +199,7 @@ def unsolved(study, name, n):
 def compare(study, kind, base_name, base_values, name, values, margin):
     """A row of one value against the next, with as many fields as it takes."""
     row = {"quantity": kind.what, "effect": np.nan, "interval_95": (np.nan, np.nan), "fields": 0, "judged": "open",
-           "same_ice": kind.same_ice}
+           "same_ice": kind.same_ice or any(key.startswith("ice.extent.") for key in base_values)}
     for n in FIELDS:
         if not (study.there(base_name, n, base_values) and (kind.own or study.there(name, n, values))):
             return row | {"why": SPENT}
@@ -183,6 +214,7 @@ def compare(study, kind, base_name, base_values, name, values, margin):
             return row | {"fields": n, "why": f"nothing to hold the {kind.what} against",
                           "judged": "matters" if kind.own and other.min() > 0 else "open"}
         row["effect"], row["interval_95"] = effect(base, other)
+        row["pairing"] = None if kind.own else pairing(base, other)
         row["fields"], row["judged"] = n, judged(row["interval_95"], margin, bool(kind.own))
         if row["judged"] != "open":
             return row
@@ -196,6 +228,7 @@ def vary(study, kind, margin, most=TRIES):
         first, unit = run.value(kind.key), run.case.get(kind.key, "").partition(" ")[2]
         walls = kind.name == "width" and run.case.get("domain.sides") == "wall"
         programme = run.case.get("tow.programme", "none") != "none"
+        extents = [{} if kind.same_ice else cut_from(run, larger) for larger in tries[1:]]
     if kind.name == "start" and programme:  # which stands in place of the ramp
         return [{"name": kind.name, "key": kind.key, "judged": "open",
                  "why": "the start is that of tow.programme; make its first rows slower by hand"}]
@@ -206,7 +239,9 @@ def vary(study, kind, margin, most=TRIES):
         a, b = (tries[j].get(kind.key, first) for j in (k, k + 1))
         row = {"name": kind.name, "key": kind.key, "unit": unit, "from": a, "to": b, "finer": kind.finer,
                "walls": walls}
-        rows.append(row | compare(study, kind, names[k], tries[k], names[k + 1], tries[k + 1], margin))
+        base = f"{kind.name}-{k}-cut" if extents[k] else names[k]
+        rows.append(row | compare(study, kind, base, tries[k] | extents[k], names[k + 1], tries[k + 1] | extents[k],
+                                  margin))
         found = rows[-1]["judged"]
         rows[-1]["recommended"] = a if found == "none" else b if found == "matters" else None
         if found == "matters" and b == a:

@@ -45,6 +45,8 @@ def cells(row):
     if "from" not in row:
         return [row["name"], "–", "–", "–", "–", WORDS[row["judged"]], row.get("why", "–")]
     on = f"{row['fields']}, {'the same ice' if row['same_ice'] else 'other ice'}"
+    if row.get("pairing") is not None:
+        on += f", error x {row['pairing']:.2g}"
     # the same twice: a start whose ramp can be no longer, looked at as it is
     values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
     return [row["name"], values, row["quantity"],
@@ -63,6 +65,7 @@ def doubtful(found):
 
 def text(found, markdown=False):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
-    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together. What is below "
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
+            "it is of the error that other ice for each value would leave. What is below "
             f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return doubtful(found) + table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note

@@ -9,7 +9,7 @@ from case_file import says
 from case_runs import checked
 
 #: where a case says one of these, the place of its ice is given, and the domain is not made wider
-PLACED = "domain.y0", "ice.y_min", "ice.y_max"
+PLACED = "domain.y0", "ice.y_min", "ice.y_max", "ice.extent.y_min", "ice.extent.y_max"
 
 
 def add_option(parser):
@@ -29,7 +29,7 @@ def read_ice_of(values):
 
 def stays(case, replaced):
     """Is the width of this case left as it is? replaced: keys that are given otherwise."""
-    return (reads_ice(case) or any(says(case, *key.split(".")) is not None for key in PLACED)
+    return (reads_ice(case) or any(says(case, *key.split(".")[:2]) is not None for key in PLACED)
             or bool({"domain.width", *PLACED} & set(replaced)))
 
 

@@ -33,7 +33,8 @@ ZERO = 1e-12  #: no value of a key is so small
 
 #: keys of ice that is made, which mean nothing where it is read
 MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread",
-        "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
+        "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake", "ice.extent.x_min", "ice.extent.x_max",
+        "ice.extent.y_min", "ice.extent.y_max")
 #: used for outlines that have no thickness of their own; a field file always has one
 THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 

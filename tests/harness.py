@@ -104,7 +104,8 @@ def quick(parameters, *kept):
 
 
 MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
-        "size_exponent", "thickness", "thickness_law", "thickness_spread", "shake", "x_min", "x_max", "y_min", "y_max")
+        "size_exponent", "thickness", "thickness_law", "thickness_spread", "shake", "x_min", "x_max", "y_min", "y_max",
+        "extent")
 
 
 def reading(base, field):

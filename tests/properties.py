@@ -166,7 +166,7 @@ def by_hand(table, folder, seed, parts, number):
     x, y = body.get("x", d["x0"]), body.get("y", d["y0"])
     floes.sort(key=lambda f: math.hypot(f["x"] - x, f["y"] - y))
     case["floes"] = floes[:number]
-    for key in ("x_min", "x_max", "y_min", "y_max"):
+    for key in ("x_min", "x_max", "y_min", "y_max", "extent"):
         ice.pop(key, None)
     ice["concentration"] = 0
     dt = case["run"]["dt"]

@@ -109,6 +109,7 @@ FREE = {
 SCENE = set("""
 run.dt run.duration domain.frame domain.length domain.width domain.x0 domain.y0 domain.ends domain.sides
 domain.ends_closing domain.sides_closing domain.ahead ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max
+ice.extent.x_min ice.extent.x_max ice.extent.y_min ice.extent.y_max
 ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max ice.size_exponent
 ice.thickness ice.thickness_law ice.crushing.pressure ice.start body.shape body.length body.width body.vertices body.x
 body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
@@ -449,6 +450,11 @@ class Scene:
                     0.7, 0.99) * self.length
                 v["ice.y_min"], v["ice.y_max"] = self.y0 + d.flat(0.01, 0.2) * self.width, self.y0 + d.flat(
                     0.7, 0.99) * self.width
+            if d.chance(0.15): # the field of a wider or longer domain, cut to this one
+                v["ice.extent.x_min"] = self.x0 - d.flat(0, 0.3) * self.length
+                v["ice.extent.x_max"] = self.x0 + d.flat(1, 1.3) * self.length
+                v["ice.extent.y_min"] = self.y0 - d.flat(0, 0.3) * self.width
+                v["ice.extent.y_max"] = self.y0 + d.flat(1, 1.3) * self.width
             return
         taken = [(self.x, self.y, self.radius)] if self.radius else []
         for _ in range(d.one(range(1, 7))):

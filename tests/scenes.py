@@ -155,6 +155,8 @@ SCENES = {
     "ice_region": changed(SHORT, domain__x0=-2, domain__y0=-3, ice=SHORT["ice"] | {
         "x_min": 1, "x_max": 12, "y_min": -2.5, "y_max": 4, "seed": 77, "shake": 5, "size_spread": 0.4,
         "thickness_law": "lognormal", "thickness_spread": 0.35}, body__y=0.5),
+    "cut_from_a_larger_extent": changed(SHORT, domain__sides="periodic", ice__extent={"y_min": -9, "y_max": 8},
+                                        ice__thickness_law="lognormal"),
     "drag_and_mass": changed(SHORT, ice__density=880, ice__added_mass=0.3, ice__added_inertia=0.2, ice__drag=DRAG,
                              body=SHORT["body"] | {"sail": 0.2, "density": 850, "added_mass": 0.7, "added_inertia": 0.3,
                                                    "friction": 0.1, "drag": DRAG},

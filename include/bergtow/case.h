@@ -100,6 +100,8 @@ typedef struct bt_case {
     struct {
         double concentration;           ///< area fraction in the ice region less the body's footprint, 0..0.95
         double x_min, x_max, y_min, y_max; ///< ice region, m; default the whole domain
+        /// region that the field is made for before it is cut to the ice region, m; NaN: that end of the ice region
+        double extent_x_min, extent_x_max, extent_y_min, extent_y_max;
         bt_ice_shape shape;
         int64_t sides;                  ///< of shape: polygons
         double aspect;                  ///< length / width of shape: rectangles

@@ -53,6 +53,7 @@ typedef struct bt_field {
     double *area;          ///< [n] m²
     double ice_area;       ///< m², the area that concentration refers to: ice region less the body's footprint
     double concentration;  ///< Σ area / ice_area as made; of outlines without what lies outside the ice region
+    double strip;          ///< width of the strip at a cut in which floes were scaled (ice.extent), m; 0 = not cut
     char frame[16];        ///< domain.frame of the case that a field file was made for; "" where it does not say
     bt_outline_counts outlines; ///< of a field that was read
     bt_idx cap;            ///< floes the arrays have room for

@@ -20,7 +20,7 @@
 static bt_check_ice ice_of_case(const bt_case *c)
 {
     return (bt_check_ice){.count = bt_case_expected_floes(c) + c->n_floes,
-                          .made = bt_case_expected_floes(c),
+                          .made = bt_case_floes_made(c),
                           .size = bt_case_mean_size(c),
                           .thickness = c->ice.thickness,
                           .concentration = c->ice.concentration};
@@ -83,7 +83,7 @@ bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_
                          bt_lead_stats *lead, bt_errors *err)
 {
     const double machine = bt_cost_machine();
-    bt_status status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, machine, err);
+    bt_status status = bt_cost_fits(c, bt_case_floes_made(c) + c->n_floes, comm, machine, err);
     if (status == BT_OK && bt_case_reads_field(c)) status = bt_field_load(c, f, err);
     if (status == BT_OK && bt_case_reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
     if (status != BT_OK) return status;

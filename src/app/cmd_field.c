@@ -82,7 +82,7 @@ int bt_cmd_field(int argc, char **argv)
                  : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
     if (status == BT_OK) status = bt_cmd_may_write(o.output, o.file.path, ours, o.force, &err);
     double start = bt_clock();
-    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
+    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_floes_made(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK)
         status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err)
@@ -100,6 +100,9 @@ int bt_cmd_field(int argc, char **argv)
         const bt_field_sizes sizes = bt_field_sizes_of(&c, &f);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
                f.concentration, f.ice_area, sizes.mean, bt_case_reads_field(&c) ? "read" : "made", took);
+        if (f.strip > 0)
+            printf("  cut from a larger extent: floes within %.4g m of the cut, or across it, are those of this region "
+                   "alone\n", f.strip);
         bt_outline_warn(&f.outlines, &c, &warnings);
         bt_field_size_warn(&c, &sizes, &warnings);
     }

@@ -179,6 +179,25 @@ static void check_region(const check *k)
                        c->ice.y_max, y1);
 }
 
+/// The field is made for the extent and cut to the ice region.
+static void check_extent(const check *k)
+{
+    const bt_case *c = k->c;
+    if (bt_case_reads_field(c)) return;
+    const struct { const char *key, *end; double at, of, sign; } all[] = {
+        {"ice.extent.x_min", "ice.x_min", c->ice.extent_x_min, c->ice.x_min, 1},
+        {"ice.extent.x_max", "ice.x_max", c->ice.extent_x_max, c->ice.x_max, -1},
+        {"ice.extent.y_min", "ice.y_min", c->ice.extent_y_min, c->ice.y_min, 1},
+        {"ice.extent.y_max", "ice.y_max", c->ice.extent_y_max, c->ice.y_max, -1}};
+    for (int i = 0; i < 4; i++)
+        if (bt_check_sound(k, all[i].key) && bt_check_sound(k, all[i].end) &&
+            all[i].sign * (all[i].at - all[i].of) > 1e-9 * (c->domain.length + c->domain.width))
+            bt_check_fault(k, all[i].key,
+                           "%g m is within the ice region, whose %s is %g m, and the field is cut from its extent; "
+                           "give at %s %g m, or leave the key out",
+                           all[i].at, all[i].end, all[i].of, all[i].sign > 0 ? "most" : "least", all[i].of);
+}
+
 static void check_sizes(const check *k)
 {
     const bt_case *c = k->c;
@@ -243,7 +262,7 @@ static void check_sizes(const check *k)
                        "two floes of %g m have no room side by side in the period of %g m as they turn; take smaller "
                        "floes or a larger domain",
                        hi, least);
-    double n = bt_case_expected_floes(c);
+    double n = bt_case_floes_made(c);
     if (n > BT_MOST_FLOES)
         bt_check_fault(k, power ? "ice.size_min" : "ice.size",
                        "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
@@ -538,6 +557,7 @@ bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
     check_run(&k);
     check_domain(&k);
     check_region(&k);
+    check_extent(&k);
     check_sizes(&k);
     check_outlines(&k);
     bt_case_check_idle(&k);

@@ -91,6 +91,7 @@ bool bt_case_key_is_idle(const bt_case *c, const char *key)
     static const char *const made[] = {"ice.concentration", "ice.shape",       "ice.sides",    "ice.aspect",
                                        "ice.size",          "ice.size_law",    "ice.size_min", "ice.size_max",
                                        "ice.size_spread",   "ice.size_exponent", "ice.shake",
+                                       "ice.extent.x_min",  "ice.extent.x_max",  "ice.extent.y_min", "ice.extent.y_max",
                                        // outlines may lack a thickness, and floes given by hand
                                        "ice.thickness_law", "ice.thickness_spread", "ice.thickness"};
     enum { N = sizeof made / sizeof *made };
@@ -142,6 +143,32 @@ double bt_case_expected_floes(const bt_case *c)
     if (bt_case_reads_field(c) || c->ice.concentration == 0) return 0; // a power law has no limits then
     const double mean_area = BT_PI / 4 * bt_case_size_moment(c, 2);
     return mean_area > 0 ? bt_max(0, bt_case_made_area(c) / mean_area) : 0; // a law that is refused makes none
+}
+
+// One axis: the region from low to high, and its domain.
+static void extend(double from, double to, double *low, double *high, double *x0, double *length, bt_bound *bound)
+{
+    // An end that is none, NaN, is that of the region; one within it has been refused.
+    const double first = fmin(from, *low), last = fmax(to, *high), slack = 1e-9 * *length;
+    if (first == *low && last == *high) return;
+    if (!(fabs(*low - *x0) <= slack && fabs(*high - *x0 - *length) <= slack)) *bound = BT_BOUND_WALL;
+    *low = *x0 = first, *high = last, *length = last - first;
+}
+
+bt_case bt_case_of_extent(const bt_case *c)
+{
+    bt_case of = *c;
+    extend(c->ice.extent_x_min, c->ice.extent_x_max, &of.ice.x_min, &of.ice.x_max, &of.domain.x0, &of.domain.length,
+           &of.domain.ends);
+    extend(c->ice.extent_y_min, c->ice.extent_y_max, &of.ice.y_min, &of.ice.y_max, &of.domain.y0, &of.domain.width,
+           &of.domain.sides);
+    return of;
+}
+
+double bt_case_floes_made(const bt_case *c)
+{
+    const bt_case of = bt_case_of_extent(c);
+    return bt_case_expected_floes(&of);
 }
 
 int64_t bt_case_steps(const bt_case *c)

@@ -56,6 +56,14 @@ double bt_case_mean_size(const bt_case *c);
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 
+/// The case whose ice region is the extent (ice.extent) of this one: the field is made for it, and then cut to the ice
+/// region. Along an axis on which the two differ it is the whole of its domain, which has periodic images of its own
+/// where those of the ice region join. No memory of its own.
+bt_case bt_case_of_extent(const bt_case *c);
+
+/// Floes that are made, those beyond the ice region too.
+double bt_case_floes_made(const bt_case *c);
+
 /// Largest speed that the current (or wind) of a case can have, m/s.
 double bt_case_fastest_flow(const bt_case *c, bool water);
 

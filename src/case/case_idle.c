@@ -39,7 +39,8 @@ static void list(const bt_case *c, idle out[RULES])
     const char *source = c->ice.field ? "ice.field" : "ice.outlines";
     const idle all[RULES] = {
         {read, "ice.concentration ice.shape ice.sides ice.aspect ice.size_law ice.size_spread ice.size_min "
-               "ice.size_max ice.size_exponent ice.shake",
+               "ice.size_max ice.size_exponent ice.shake ice.extent.x_min ice.extent.x_max ice.extent.y_min "
+               "ice.extent.y_max",
          source, "on ice that is read from a file"},
         {read && !sized, "ice.size", source, "on ice that is read from a file"},
         {c->ice.field, "ice.thickness_law ice.thickness_spread", "ice.field",

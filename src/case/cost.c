@@ -76,9 +76,9 @@ double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice)
 
 double bt_cost_seconds(const bt_case *c)
 {
-    const double made = bt_case_expected_floes(c);
-    const bt_cost_ice ice = {.floes = made + c->n_floes + 1, .concentration = c->ice.concentration};
-    return bt_cost_making(c, made) + bt_cost_stepping(c, &ice);
+    const bt_cost_ice ice = {.floes = bt_case_expected_floes(c) + c->n_floes + 1,
+                             .concentration = c->ice.concentration};
+    return bt_cost_making(c, bt_case_floes_made(c)) + bt_cost_stepping(c, &ice);
 }
 
 // --- memory ----------------------------------------------------------------------------------------------------------

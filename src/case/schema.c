@@ -118,6 +118,12 @@ bt_key bt_case_keys[] = {
     REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
     REAL("ice.y_max", ice.y_max, LENGTH, "= domain.y0 + domain.width", ANYWHERE, "ice region, high end of y"),
+    REAL("ice.extent.x_min", ice.extent_x_min, LENGTH, "none", ANYWHERE,
+         "low end of x of the region that the field is made for, and then cut to the ice region: cases that differ in "
+         "their domain alone have the same floes, but for a strip at the cut; none: the end of the ice region"),
+    REAL("ice.extent.x_max", ice.extent_x_max, LENGTH, "none", ANYWHERE, "high end of x, as ice.extent.x_min"),
+    REAL("ice.extent.y_min", ice.extent_y_min, LENGTH, "none", ANYWHERE, "low end of y, as ice.extent.x_min"),
+    REAL("ice.extent.y_max", ice.extent_y_max, LENGTH, "none", ANYWHERE, "high end of y, as ice.extent.x_min"),
     CHOICE("ice.shape", ice.shape, ice_shapes, "voronoi",
            "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
     INT("ice.sides", ice.sides, "6", "[3, 32]", "corners of the floes of shape polygons"),

@@ -81,31 +81,44 @@ void bt_field_scale(bt_field *f, bt_idx i, double s)
     f->area[i] *= s * s;
 }
 
-// Area with every floe scaled by min(clearance, √λ).
-static double area_at(const bt_field *f, const double *clearance, double lambda)
+double bt_field_area_at(const bt_field *f, const double *clearance, const bool *held, double lambda)
 {
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) sum += f->area[i] * bt_min(clearance[i] * clearance[i], lambda);
+    for (bt_idx i = 0; i < f->n; i++)
+        sum += f->area[i] * (held && held[i] ? 1 : bt_min(clearance[i] * clearance[i], lambda));
     return sum;
 }
 
-double bt_field_fit(bt_field *f, const double *clearance, double wanted)
+double bt_field_fit(bt_field *f, const double *clearance, const bool *held, double wanted)
 {
     double low = 0, high = 1;
     for (bt_idx i = 0; i < f->n; i++) high = bt_max(high, clearance[i] * clearance[i]);
-    // area_at grows with λ: bisect. 200 halvings end at neighbouring doubles.
+    // the area grows with λ: bisect. 200 halvings end at neighbouring doubles.
     for (int k = 0; k < 200 && low < high; k++) {
         double mid = low + (high - low) / 2;
         if (mid == low || mid == high) break;
-        *(area_at(f, clearance, mid) < wanted ? &low : &high) = mid;
+        *(bt_field_area_at(f, clearance, held, mid) < wanted ? &low : &high) = mid;
     }
     double sum = 0;
     for (bt_idx i = 0; i < f->n; i++) {
-        double s = bt_min(clearance[i], sqrt(high));
+        double s = held && held[i] ? 1 : bt_min(clearance[i], sqrt(high));
         if (s != 1) bt_field_scale(f, i, s);
         sum += f->area[i];
     }
     return sum;
+}
+
+void bt_field_append(bt_field *f, const bt_field *from, bt_idx i)
+{
+    const bt_idx k = f->n;
+    const int64_t first = from->offsets[i], n = from->offsets[i + 1] - first, at = f->offsets[k];
+    reserve(f, k + 1, at + n);
+    memcpy(f->vertices + 2 * at, from->vertices + 2 * first, 2 * (size_t)n * sizeof *f->vertices);
+    memcpy(f->pose + 3 * k, from->pose + 3 * i, 3 * sizeof *f->pose);
+    f->thickness[k] = from->thickness[i];
+    f->area[k] = from->area[i];
+    f->offsets[k + 1] = at + n;
+    f->n++;
 }
 
 // Spread the low 32 bits of x to the even bits.
@@ -142,16 +155,7 @@ void bt_field_sort(bt_field *f, const bt_region *y)
     bt_field_init(&g);
     reserve(&g, f->n, f->offsets[f->n]);
     // Copied as they are: bt_field_add would centre once more and change last digits.
-    for (bt_idx k = 0; k < f->n; k++) {
-        bt_idx i = order[k].i;
-        int64_t from = f->offsets[i], n = f->offsets[i + 1] - from;
-        memcpy(g.vertices + 2 * g.offsets[k], f->vertices + 2 * from, 2 * (size_t)n * sizeof *g.vertices);
-        memcpy(g.pose + 3 * k, f->pose + 3 * i, 3 * sizeof *g.pose);
-        g.thickness[k] = f->thickness[i];
-        g.area[k] = f->area[i];
-        g.offsets[k + 1] = g.offsets[k] + n;
-    }
-    g.n = f->n;
+    for (bt_idx k = 0; k < f->n; k++) bt_field_append(&g, f, order[k].i);
     g.ice_area = f->ice_area;
     g.concentration = f->concentration;
     free(order);

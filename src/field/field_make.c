@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "field/field_make.h"
+#include "case/case_derived.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
 #include "base/largest.h"
@@ -122,7 +123,7 @@ static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt
         bt_field_scale(f, k, s);
         clearance[k] = (1 - 1e-6) / s;
     }
-    double reached = bt_field_fit(f, clearance, wanted);
+    double reached = bt_field_fit(f, clearance, NULL, wanted);
     free(clearance);
     return reached > (1 - 1e-6) * wanted ? BT_OK : cannot_pack(c, reached / y->ice_area, err);
 }
@@ -213,7 +214,7 @@ static bool settled(const bt_region *y, bt_field *f, double wanted, char why[160
         good = clearance[i] > 0.9;
         if (!good) snprintf(why, 160, "floe %lld is stuck in another after the shake", (long long)i);
     }
-    const double reached = good ? bt_field_fit(f, clearance, wanted) : wanted;
+    const double reached = good ? bt_field_fit(f, clearance, NULL, wanted) : wanted;
     if (reached < 0.995 * wanted) {
         snprintf(why, 160, "concentration %g after the shake, %g wanted", reached / y->ice_area, wanted / y->ice_area);
         good = false;
@@ -277,9 +278,18 @@ bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
     bt_sizes sizes;
     bt_status status = bt_sizes_init(&sizes, c, err);
     if (status != BT_OK) return status;
-    bt_region y;
+    // The field is that of the extent; where it is larger than the ice region, it is cut to it afterwards.
+    const bt_case whole = bt_case_of_extent(c);
+    bt_region y, of;
     status = bt_region_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
-    if (status == BT_OK && c->ice.concentration > 0) status = make(c, &y, &sizes, f, err);
+    if (status == BT_OK) {
+        status = bt_region_init(&of, &whole, y.clearance, err);
+        if (status == BT_OK && c->ice.concentration > 0) {
+            status = make(&whole, &of, &sizes, f, err);
+            if (status == BT_OK) status = bt_field_cut(c, &of, &y, bt_sizes_mean(&sizes), f, err);
+        }
+        bt_region_free(&of);
+    }
     f->ice_area = y.ice_area;
     f->concentration = y.ice_area > 0 ? total_area(f) / y.ice_area : 0;
     bt_region_free(&y);

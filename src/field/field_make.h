@@ -57,8 +57,8 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
 int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed);
-/// Remove short edges and vertices beyond BT_TESSELLATION_VERTICES inwards; returns the new count.
-int bt_tessellation_clean(int n, double *v, double shortest);
+/// Remove edges shorter than this, m, and vertices beyond `most` inwards; returns the new count.
+int bt_tessellation_clean(int n, double *v, double shortest, int most);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
 double *bt_field_outlines(const bt_field *f);
@@ -77,8 +77,15 @@ void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double
 
 /// Scale floe i about its centroid.
 void bt_field_scale(bt_field *f, bt_idx i, double s);
-/// Scale floes by common factors λ <= clearance so that Σ area = wanted; returns the area reached.
-double bt_field_fit(bt_field *f, const double *clearance, double wanted);
+/// Area with every floe but those held scaled by min(clearance, √λ), m². held: NULL = none.
+double bt_field_area_at(const bt_field *f, const double *clearance, const bool *held, double lambda);
+/// Scale them so by the λ that makes Σ area = wanted; returns the area reached.
+double bt_field_fit(bt_field *f, const double *clearance, const bool *held, double wanted);
+/// Append floe i of another field as it is, to the bit.
+void bt_field_append(bt_field *f, const bt_field *from, bt_idx i);
+/// Cut the field of region `whole` to the region y of case c, with its concentration; size: mean diameter, m.
+bt_status bt_field_cut(const bt_case *c, const bt_region *whole, const bt_region *y, double size, bt_field *f,
+                       bt_errors *err);
 /// Sort floes along a Morton curve.
 void bt_field_sort(bt_field *f, const bt_region *y);
 

@@ -252,7 +252,8 @@ int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
     enum { CAP = 2 * BT_MAX_VERTICES };
     double trial[2 * CAP], best[2 * CAP];
     for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
-        if (n > 4 * BT_TESSELLATION_VERTICES) n = bt_tessellation_clean(n, v, 0); // many obstacles around one cell
+        if (n > 4 * BT_TESSELLATION_VERTICES) // many obstacles around one cell
+            n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
         const bt_obstacle *o = &y->obstacles[k];
         double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
         for (int i = 0; i < n; i++) {
@@ -292,7 +293,7 @@ int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
     return n;
 }
 
-int bt_tessellation_clean(int n, double *v, double shortest)
+int bt_tessellation_clean(int n, double *v, double shortest, int most)
 {
     // A subset of the vertices of a convex polygon is convex and lies inside it. Of the shortest edge's two ends, the
     // one whose removal costs less area goes.
@@ -304,7 +305,7 @@ int bt_tessellation_clean(int n, double *v, double shortest)
             double l = bt_hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
             if (l < least) least = l, at = i;
         }
-        if (least >= shortest && n <= BT_TESSELLATION_VERTICES) break;
+        if (least >= shortest && n <= most) break;
         double loss[2];
         for (int e = 0; e < 2; e++) {
             const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n),

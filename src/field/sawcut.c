@@ -41,7 +41,7 @@ static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x
     double v[2 * 8 * BT_TESSELLATION_VERTICES];
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
     int n = bt_tessellation_clear(y, 4, v, effort == 0);
-    if (n >= 3) n = bt_tessellation_clean(n, v, 0);
+    if (n >= 3) n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
     double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_moments(n, v).area : 0;
     // Halves waste less water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {

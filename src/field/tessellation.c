@@ -351,7 +351,7 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
         int m = ice_cell(&g, i, v);
         if (m < 3) continue;
         double full = bt_shape_moments(m, v).area;
-        m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI));
+        m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
         bt_moments mo = bt_shape_moments(m, v);
         if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
         cells.nv[i] = m;

@@ -132,7 +132,7 @@ void bt_ensemble_list(bt_ensemble *e)
             const bool read = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK;
             cost = read ? bt_cost_seconds(&c) : 0;
             e->fixed += read && !bt_case_ice_is_random(&c);
-            if (read) e->most_floes = bt_max(e->most_floes, bt_case_expected_floes(&c) + (double)c.n_floes);
+            if (read) e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }

@@ -44,7 +44,7 @@ typedef bt_running run;
 static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, bt_cost_machine(), err);
+    if (comm->rank == 0) status = bt_cost_fits(c, bt_case_floes_made(c) + c->n_floes, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_field_load(c, f, err);
     // a field that was read has only now a number
     if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err);

@@ -172,7 +172,10 @@ def test_a_channel_that_is_too_narrow_is_found(tmp_path):
     dense = changed(CASE, ice__concentration=0.7, domain__width=4, run__duration=18, output__window_start=6)
     found, text = converged(tmp_path, dense, "--vary", "width", "--budget", 3, "--tries", 1)
     row = found["rows"][0]
-    assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and not row["same_ice"]
+    assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and row["same_ice"]
+    assert 0 < row["pairing"] < 2 and ", the same ice, error x " in text
+    begun = json.loads((tmp_path / "out/converge/width-0-cut/f001/call.json").read_text())
+    assert {"ice.extent.y_min=-4", "ice.extent.y_max=4"} <= set(begun)
     assert "the walls are felt; without them, take 8 m or wider" in text
 
 
@@ -446,8 +449,24 @@ def test_an_ice_region_that_reaches_the_ends_of_the_domain_goes_with_them(tmp_pa
     run(tmp_path, case, "--set", f"ice.y_max={width / 2}", name="given")
     with Run(tmp_path / "given") as there:
         assert converge.longer(there, 1) == {"domain.length": 30, "domain.x0": 0, "body.x": 3, "ice.x_max": 30}
+        assert converge.cut_from(there, converge.longer(there, 1)) == {"ice.extent.x_max": 30}
+        assert converge.cut_from(there, converge.wider(there, 1)) == {"ice.extent.y_max": width}
         # of two sides the one that the ice reaches; the other has open water of its own
         assert converge.wider(there, 1) == {"domain.width": 2 * width, "domain.y0": -width, "ice.y_max": width}
     run(tmp_path, changed(CASE, run__duration=4, output__window_start=2), name="own")
     with Run(tmp_path / "own") as there:  # what the case does not give follows the domain by itself
         assert set(converge.wider(there, 1)) == {"domain.width", "domain.y0"}
+        assert converge.cut_from(there, converge.wider(there, 1)) == {"ice.extent.y_min": -width,
+                                                                      "ice.extent.y_max": width}
+    run(tmp_path, changed(CASE, ice__concentration=0, run__duration=4, output__window_start=2), name="open")
+    with Run(tmp_path / "open") as there:
+        assert converge.cut_from(there, converge.wider(there, 1)) == {}  # no ice is made
+
+
+def test_the_worth_of_common_fields():
+    """Of correlation r the error of a difference is √(1 − r) of that of two samples."""
+    rng = np.random.default_rng(1)
+    common, own, third = rng.standard_normal((3, 20000))
+    base, other = 10 + 0.6 * common + 0.8 * own, 10 + 0.6 * common + 0.8 * third
+    assert converge.pairing(base, other) == pytest.approx(0.8, abs=0.01)
+    assert converge.pairing(np.ones(4), np.ones(4)) is None

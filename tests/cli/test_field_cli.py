@@ -31,6 +31,9 @@ FIELDS = {
     "periodic": changed(BASE, domain__ends="periodic", domain__sides="periodic"),
     "region": changed(BASE, ice__x_min=6, ice__x_max=15, ice__y_min=-4, ice__y_max=2.5),
     "ship": changed(BASE, body={"shape": "ship", "length": 4, "width": 1.5, "x": 8, "yaw": 33}, ice__concentration=0.8),
+    "cut": changed(BASE, ice__extent={"x_max": 24, "y_min": -9, "y_max": 9}),
+    "cut periodic": changed(BASE, domain__ends="periodic", domain__sides="periodic", body__y=4,
+                            ice__extent={"x_max": 24, "y_min": -9, "y_max": 9}),
     "no body": changed(BASE, body={"shape": "none"}),
 }
 
@@ -187,6 +190,32 @@ def test_a_seed_is_a_field(tmp_path):
     assert a.n > 100
     near = min(np.hypot(*(b.pose[:, :2] - p[:2]).T).min() for p in a.pose)
     assert near > 1e-6, "floes of one field stand in the other"
+
+
+@pytest.mark.parametrize("ends", ["wall", "moving"])
+def test_domains_of_one_extent_share_their_floes(tmp_path, ends):
+    """A width, a length, and a scaled twin; a run takes the field that is written. Red when the width alone, and not
+    the place, says where the extent lies: the shorter domain begins elsewhere."""
+    extent = {"x_min": -12, "x_max": 24, "y_min": -9, "y_max": 9}
+    large = changed(BASE, domain={"length": 36, "width": 18, "x0": -12, "ends": ends, "sides": "periodic"},
+                    ice__thickness_law="lognormal")
+    small = changed(large, domain={"length": 24, "width": 12, "x0": -4, "ends": ends, "sides": "periodic"},
+                    ice__extent=extent)
+    whole, part = Field(make(tmp_path, large, name="large.h5")), Field(made := make(tmp_path, small, name="small.h5"))
+    shape = {tuple(p): (v.tobytes(), h) for p, v, h in zip(whole.pose, whole.local, whole.thickness)}
+    common = [shape.get(tuple(p)) == (v.tobytes(), h) for p, v, h in zip(part.pose, part.local, part.thickness)]
+    from_side = np.minimum(np.minimum(part.pose[:, 0] + 4, 20 - part.pose[:, 0]), 6 - np.abs(part.pose[:, 1]))
+    own = from_side[~np.array(common)]
+    assert np.mean(common) > 0.4 and own.max() < 3, (np.mean(common), own.max())
+    said = call("field", write_case(tmp_path, small), "-o", tmp_path / "again.h5").stdout
+    assert "cut from a larger extent" in said
+    one = run(tmp_path, small, "--steps", 3, name="one")
+    assert one.hash == run(tmp_path, changed(
+        reading(small, made), ice__size=0.7 if ends == "moving" else None), "--steps", 3, name="two").hash
+    twin = call("check", write_case(tmp_path, small), "--scale", 10).stdout
+    assert "-120 m" in twin and "240 m" in twin
+    long = call("run", write_case(tmp_path, changed(small, ice__extent={"x_min": -3})), "-o", tmp_path / "no")
+    assert long.returncode == CASE and "ice.extent.x_min: -3 m is within the ice region" in long.stderr
 
 
 def clark_evans(f, ground):

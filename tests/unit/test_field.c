@@ -134,7 +134,7 @@ static polygon body_in_place(const bt_case *c)
 }
 
 // Everything a field must be, whatever made it.
-static void assert_sound(const bt_case *c, const bt_field *f, const char *what)
+static void assert_sound_within(const bt_case *c, const bt_field *f, const char *what, double tolerance)
 {
     double sum = 0, round_off = 1e-12 * c->domain.length;
     polygon body = body_in_place(c);
@@ -165,8 +165,13 @@ static void assert_sound(const bt_case *c, const bt_field *f, const char *what)
     double least = least_gap(c, f, NULL);
     if (least < -round_off) fail_msg("%s: floes overlap by %g m", what, -least);
     double wanted = c->ice.concentration * f->ice_area;
-    if (!(fabs(sum - wanted) <= 1e-6 * wanted)) fail_msg("%s: concentration %.9f", what, sum / f->ice_area);
+    if (!(fabs(sum - wanted) <= tolerance * wanted)) fail_msg("%s: concentration %.9f", what, sum / f->ice_area);
     assert_true(fabs(f->concentration - sum / f->ice_area) < 1e-9);
+}
+
+static void assert_sound(const bt_case *c, const bt_field *f, const char *what)
+{
+    assert_sound_within(c, f, what, 1e-6);
 }
 
 static void assert_makes(bt_case c, bt_ice_shape shape, double concentration, const char *what)
@@ -340,6 +345,108 @@ static void assert_law(const bt_case *c, double mean, double sd)
         fail_msg("sd %g, want %g", sqrt(sum2 - sum * sum), sd);
     assert_true(fabs(bt_sizes_mean(&s) - mean) < 0.001 * mean);
     assert_true(fabs(bt_sizes_mean_area(&s) - BT_PI / 4 * sum2) < 0.03 * sum2);
+}
+
+// Is floe i of f one of g, to the bit? Near an edge of a larger field or not: both have it in their own order.
+static bool has(const bt_field *g, const bt_field *f, bt_idx i)
+{
+    const int64_t n = f->offsets[i + 1] - f->offsets[i];
+    for (bt_idx k = 0; k < g->n; k++)
+        if (memcmp(g->pose + 3 * k, f->pose + 3 * i, 3 * sizeof *f->pose) == 0)
+            return g->offsets[k + 1] - g->offsets[k] == n && g->thickness[k] == f->thickness[i] &&
+                   memcmp(g->vertices + 2 * g->offsets[k], f->vertices + 2 * f->offsets[i],
+                          2 * (size_t)n * sizeof *f->vertices) == 0;
+    return false;
+}
+
+// The domain of c is that of `large` but for its size, and its field is cut from that one's: the same floes but for the
+// strip.
+static void assert_shares(const bt_case *large, bt_case c, const char *what)
+{
+    c.ice.extent_x_min = large->ice.x_min, c.ice.extent_x_max = large->ice.x_max;
+    c.ice.extent_y_min = large->ice.y_min, c.ice.extent_y_max = large->ice.y_max;
+    bt_field f = made(large), g = made(&c);
+    char name[100];
+    snprintf(name, sizeof name, "%s at %g, seed %d", what, c.ice.concentration, (int)c.ice.seed);
+    assert_sound_within(&c, &g, name, 0.005);
+    const bool in_x = c.ice.x_max < large->ice.x_max, in_y = c.ice.y_max < large->ice.y_max;
+    assert_true(g.strip >= c.ice.size && g.strip <= 0.25 * (in_x ? c.domain.length : c.domain.width));
+    bt_idx common = 0, expected = 0;
+    const bt_field *both[2] = {&f, &g};
+    for (int k = 0; k < 2; k++)
+        for (bt_idx i = 0; i < both[k]->n; i++) {
+            const double x = both[k]->pose[3 * i], y = both[k]->pose[3 * i + 1];
+            const polygon p = in_place(both[k], i);
+            bool whole = true; // those that were cut lie at the side, whatever their centroid
+            for (int e = 0; e < p.n; e++)
+                whole = whole && (!in_x || p.v[2 * e] < c.ice.x_max - 0.01) &&
+                        (!in_y || fabs(p.v[2 * e + 1]) < c.ice.y_max - 0.01);
+            if (!whole || (in_x && !(x < c.ice.x_max - g.strip - 1e-9)) ||
+                (in_y && !(fabs(y) < c.ice.y_max - g.strip - 1e-9)))
+                continue;
+            if (!has(both[!k], both[k], i)) fail_msg("%s: floe at (%g, %g) is of one field alone", name, x, y);
+            if (k) common++;
+            else expected++;
+        }
+    assert_int_equal(common, expected);
+    assert_true(common > g.n / 3);
+    bt_field_free(&f);
+    bt_field_free(&g);
+}
+
+// Red where the strip is not scaled (concentration), all floes are (bits), thickness follows the cut (bits), or the
+// body's image over the seam is forgotten (overlap).
+static void test_cut(void **state)
+{
+    (void)state;
+    const double concentration[] = {0.2, 0.5, 0.8, 0.9};
+    for (int k = 0; k < 4; k++)
+        for (int seed = 7; seed < 9; seed++) {
+            bt_case c = basin(), wide;
+            c.ice.concentration = concentration[k], c.ice.seed = seed;
+            c.ice.thickness_law = BT_THICK_LOGNORMAL, c.ice.thickness_spread = 0.3;
+            c.domain.sides = seed == 8 ? BT_BOUND_PERIODIC : BT_BOUND_WALL;
+            wide = c;
+            wide.domain.width = 24, wide.domain.y0 = wide.ice.y_min = -12, wide.ice.y_max = 12;
+            assert_shares(&wide, c, "width");
+            bt_case shorter = c;
+            shorter.domain.length = shorter.ice.x_max = 25;
+            assert_shares(&c, shorter, "length");
+        }
+    // the body over the edge of a domain whose extent has no image of it there
+    bt_case c = basin();
+    c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC, c.body.y = 4.5;
+    bt_case wide = c;
+    wide.domain.width = 24, wide.domain.y0 = wide.ice.y_min = -12, wide.ice.y_max = 12;
+    assert_shares(&wide, c, "body over the edge");
+    c.ice.shape = wide.ice.shape = BT_ICE_RECTANGLES;
+    assert_shares(&wide, c, "rectangles");
+    c.ice.shape = wide.ice.shape = BT_ICE_POLYGONS, c.ice.concentration = wide.ice.concentration = 0.6;
+    assert_shares(&wide, c, "hexagons");
+    // Ice up to both ends of a period, where floes of the extent lie across its own seam, and no slivers. Red without
+    // the images of the extent (-40 % there), or with all parts kept.
+    c = basin();
+    c.domain.ends = BT_BOUND_PERIODIC, c.body.shape = BT_BODY_ABSENT;
+    c.ice.size_spread = 0, c.ice.concentration = 0.9, c.ice.extent_x_max = 50;
+    bt_field p = made(&c);
+    double ends = 0, smallest = INFINITY, out[2 * BT_MAX_VERTICES + 2], at[2 * BT_MAX_VERTICES + 2];
+    for (bt_idx i = 0; i < p.n; i++) {
+        const polygon q = in_place(&p, i);
+        const int low = bt_shape_clip(q.n, q.v, 1, 0, 0.4, out), high = bt_shape_clip(q.n, q.v, -1, 0, -35.6, at);
+        ends += (low >= 3 ? bt_shape_moments(low, out).area : 0) + (high >= 3 ? bt_shape_moments(high, at).area : 0);
+        smallest = fmin(smallest, p.area[i]);
+    }
+    assert_true(fabs(ends / (0.9 * 0.8 * 10) - 1) < 0.12);
+    assert_true(smallest > 0.05 * BT_PI / 4);
+    bt_field_free(&p);
+    // an extent that is the ice region changes no bit
+    c = basin();
+    bt_field f = made(&c);
+    c.ice.extent_x_min = 0, c.ice.extent_x_max = 36, c.ice.extent_y_min = -5, c.ice.extent_y_max = 5;
+    bt_field g = made(&c);
+    assert_true(same(&f, &g) && g.strip == 0);
+    bt_field_free(&f);
+    bt_field_free(&g);
 }
 
 static void test_size_laws(void **state)
@@ -592,6 +699,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_add),         cmocka_unit_test(test_voronoi),
         cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),  cmocka_unit_test(test_surroundings),
+        cmocka_unit_test(test_cut),
         cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
         cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),   cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+// A field that was made for a larger region, cut to the ice region (ice.extent), so that domains of other widths and
+// lengths share their floes.
+//
+// A floe within the ice region stays as it is, to the bit, with its thickness. One across a side at which the extent
+// goes on is cut along it, less the clearance c that a made field keeps from bodies: the part within lies apart from
+// the wall, and at a periodic seam 2c from the part at the other end, with which it no longer makes one floe. Convex
+// stays convex. A part of less than LEAST_PART of its floe is left out. So nothing overlaps, whatever the boundaries.
+//
+// A part of a field has another concentration than the whole (theory.md has the scatter measured). Floes whose centroid
+// is within the strip of width s of a cut side, and those that were cut, are scaled about their centroids by one
+// factor, as far as each has room, until Σ area = concentration × ice area. s is one mean diameter, or as many more as
+// it takes for areas to change by no more than MOST_CHANGE; in the widest strip they may by LAST_CHANGE, which small
+// domains of few floes need.
+//
+// Rejected: floes taken out or put in at random, of whole floes, which leaves the half of a floe; all floes scaled,
+// which leaves no floe that two widths have in common; another shake of the strip, in which some floes would go.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/elementary.h"
+#include "bergtow/shape.h"
+#include "field/field_make.h"
+
+static const double LEAST_PART = 0.1;   // of a floe's area
+static const double SHORT_EDGE = 0.02;  // of the diameter of a part
+static const double MOST_CHANGE = 0.25; // of a floe's area in the strip, as long as that can be widened
+static const double LAST_CHANGE = 0.5;  // in the widest strip
+static const double WIDEST = 0.25;      // of the ice region across a cut: more than half of it is left as it is
+static const double TOLERANCE = 0.005;  // of the concentration
+static const double TOUCH = 1 - 1e-9, ROUND_OFF = 1e-12;
+enum { MORE_PASSES = 20 };
+
+/// One axis of a cut: where the ice region begins and ends, and which of the two the extent reaches beyond.
+typedef struct axis {
+    double low, high, period; ///< m; period of the extent, 0 = none
+    bool at_low, at_high;
+} axis;
+
+static axis axis_of(double low, double high, double from, double to, bool periodic)
+{
+    const bool differ = low != from || high != to;
+    // where the extent joins on to itself at an end that both have, its floes lie across it, and are cut
+    return (axis){.low = low, .high = high, .period = differ && periodic ? to - from : 0,
+                  .at_low = differ && (periodic || low != from), .at_high = differ && (periodic || high != to)};
+}
+
+static bool in_obstacle(const bt_region *y, int n, const double *v, double x, double z, double radius)
+{
+    for (int k = 0; k < y->n_obstacles; k++) {
+        const bt_obstacle *o = &y->obstacles[k];
+        const double dx = o->x - x, dy = o->y - z, reach = o->radius + radius;
+        if (dx * dx + dy * dy >= reach * reach) continue;
+        double own[2 * BT_MAX_VERTICES];
+        for (int i = 0; i < o->n; i++) own[2 * i] = o->v[2 * i] - o->x, own[2 * i + 1] = o->v[2 * i + 1] - o->y;
+        if (bt_apart_of(n, v, o->n, own, dx, dy).gap < 0) return true;
+    }
+    return false;
+}
+
+/// Least and most of the vertices, m, along one coordinate.
+static void reach_of(int n, const double *v, int k, double *low, double *high)
+{
+    *low = INFINITY, *high = -INFINITY;
+    for (int i = 0; i < n; i++) *low = bt_min(*low, v[2 * i + k]), *high = bt_max(*high, v[2 * i + k]);
+}
+
+/// What of the polygon v, in place, lies within the sides that it crosses; its vertices, 0 = nothing, into v. `crossed`
+/// is set when that is not all of it.
+static int part_within(const axis a[2], double clearance, int n, double *v, bool *crossed)
+{
+    double out[2 * BT_MAX_VERTICES + 16];
+    for (int k = 0; k < 2; k++)
+        for (int end = 0; end < 2; end++) {
+            double low, high;
+            reach_of(n, v, k, &low, &high);
+            const double sign = end ? 1 : -1, side = end ? a[k].high : a[k].low;
+            if (!(end ? a[k].at_high && high > side : a[k].at_low && low < side)) continue;
+            *crossed = true;
+            n = bt_shape_clip(n, v, k ? 0 : sign, k ? sign : 0, sign * side - clearance, out);
+            if (n < 3) return 0;
+            memcpy(v, out, 2 * (size_t)n * sizeof *v);
+        }
+    return n;
+}
+
+/// Add floe i of `from`, or one of its images (dx, dy) away, as far as it lies in the region.
+static void add_part(const bt_region *y, const axis a[2], const bt_field *from, const double *outline, bt_idx i,
+                     double dx, double dy, bt_field *to, bool **parted)
+{
+    enum { MOST_CLEARED = 8 * BT_MAX_VERTICES };
+    const int all = (int)(from->offsets[i + 1] - from->offsets[i]);
+    const double x = from->pose[3 * i] + dx, z = from->pose[3 * i + 1] + dy, *own = outline + 2 * from->offsets[i];
+    double v[2 * MOST_CLEARED], radius = 0;
+    for (int k = 0; k < all; k++) {
+        v[2 * k] = x + own[2 * k], v[2 * k + 1] = z + own[2 * k + 1];
+        radius = bt_max(radius, bt_hypot(own[2 * k], own[2 * k + 1]));
+    }
+    bool changed = false;
+    int n = part_within(a, y->clearance, all, v, &changed);
+    // a body that reaches over the seam of the domain stands where the extent had no image of it
+    if (n >= 3 && in_obstacle(y, all, own, x, z, radius)) {
+        n = bt_tessellation_clear(y, n, v, false);
+        changed = true;
+    }
+    const bt_idx k = to->n;
+    if (!changed) {
+        bt_field_append(to, from, i);
+        to->pose[3 * k] = x, to->pose[3 * k + 1] = z;
+    } else {
+        bt_moments m = {0};
+        if (n >= 3) m = bt_shape_extent(n, v);
+        if (m.area < LEAST_PART * from->area[i]) return;
+        n = bt_tessellation_clean(n, v, SHORT_EDGE * 2 * sqrt(m.area / BT_PI), BT_MAX_VERTICES);
+        m = bt_shape_centre(n, v);
+        bt_field_add(to, n, v, m.cx, m.cy, 0, from->thickness[i]);
+        bt_region_wrap(y, &to->pose[3 * k], &to->pose[3 * k + 1]);
+    }
+    *parted = bt_realloc(*parted, (size_t)to->n, sizeof **parted);
+    (*parted)[k] = changed;
+}
+
+/// Distance of a point from the nearest cut side, m.
+static double to_cut(const axis a[2], const double *at)
+{
+    double least = INFINITY;
+    for (int k = 0; k < 2; k++) {
+        if (a[k].at_low) least = bt_min(least, fabs(at[k] - a[k].low));
+        if (a[k].at_high) least = bt_min(least, fabs(a[k].high - at[k]));
+    }
+    return least;
+}
+
+/// How much each floe may be scaled, but for those held, so that none touches another and no area has changed by more
+/// than `change` from what it was.
+static void room_of(const bt_region *y, const bt_field *f, const double *first, double change, double *clearance)
+{
+    bt_field_growth(y, f, sqrt(1 + change), clearance);
+    for (bt_idx i = 0; i < f->n; i++)
+        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / f->area[i]));
+}
+
+/// Scale the floes of the strip; the area reached, m².
+static double scale_strip(const bt_region *y, const axis a[2], const bool *parted, double size, double wanted,
+                          bt_field *f)
+{
+    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance), *first = bt_alloc((size_t)f->n, sizeof *first),
+           widest = INFINITY, area = bt_field_floe_area(f);
+    bool *held = bt_alloc((size_t)f->n, sizeof *held);
+    memcpy(first, f->area, (size_t)f->n * sizeof *first);
+    for (int k = 0; k < 2; k++)
+        if (a[k].at_low || a[k].at_high) widest = bt_min(widest, WIDEST * (a[k].high - a[k].low));
+    room_of(y, f, first, LAST_CHANGE, clearance);
+    for (f->strip = bt_min(size, widest);; f->strip = bt_min(f->strip + size, widest)) {
+        for (bt_idx i = 0; i < f->n; i++) held[i] = !parted[i] && !(to_cut(a, f->pose + 3 * i) < f->strip);
+        const double change = f->strip < widest ? MOST_CHANGE : LAST_CHANGE,
+                     low = bt_field_area_at(f, clearance, held, 1 - change),
+                     high = bt_field_area_at(f, clearance, held, 1 + change);
+        if ((low <= wanted && wanted <= high) || f->strip == widest) {
+            area = bt_field_fit(f, clearance, held, bt_max(low, wanted));
+            break;
+        }
+    }
+    // What one neighbour does not take of the gap between two, the other may.
+    for (int pass = 0; pass < MORE_PASSES && area < (1 - ROUND_OFF) * wanted; pass++) {
+        room_of(y, f, first, LAST_CHANGE, clearance);
+        area = bt_field_fit(f, clearance, held, wanted);
+    }
+    free(first);
+    free(clearance);
+    free(held);
+    return area;
+}
+
+bt_status bt_field_cut(const bt_case *c, const bt_region *whole, const bt_region *y, double size, bt_field *f,
+                       bt_errors *err)
+{
+    const axis a[2] = {axis_of(y->x0, y->x1, whole->x0, whole->x1, whole->periodic_x),
+                       axis_of(y->y0, y->y1, whole->y0, whole->y1, whole->periodic_y)};
+    if (!(a[0].at_low || a[0].at_high || a[1].at_low || a[1].at_high)) return BT_OK;
+    const int over_x = a[0].period > 0, over_y = a[1].period > 0;
+    double *outline = bt_field_outlines(f);
+    bool *parted = NULL;
+    bt_field part;
+    bt_field_init(&part);
+    for (bt_idx i = 0; i < f->n; i++)
+        for (int ix = -over_x; ix <= over_x; ix++)
+            for (int iy = -over_y; iy <= over_y; iy++)
+                add_part(y, a, f, outline, i, ix * a[0].period, iy * a[1].period, &part, &parted);
+    free(outline);
+    const double wanted = c->ice.concentration * y->ice_area,
+                 area = part.n > 0 ? scale_strip(y, a, parted, size, wanted, &part) : 0, strip = part.strip;
+    free(parted);
+    bt_field_free(f);
+    *f = part;
+    bt_field_sort(f, y);
+    f->strip = strip;
+    if (fabs(area - wanted) <= TOLERANCE * wanted) return BT_OK;
+    bt_errors_add(err,
+                  "%s: ice.extent: the field cut to the ice region has a concentration of %.4g, %g wanted, with floes "
+                  "scaled within %.3g m of the cut; take another ice.seed, smaller floes, or a larger ice region",
+                  c->path ? c->path : "case", area / y->ice_area, c->ice.concentration, strip);
+    return BT_ERR_CASE;
+}
