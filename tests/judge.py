@@ -41,7 +41,7 @@ def may_be_null(path, case, summary):
         (r"window\.n_contact_stretches", not body or window < 20
          or not (summary["sd_ice_resistance_n"] or 0) > 0.02 * abs(summary["mean_ice_resistance_n"] or 0)),
         (r"budget\..*relative", True),  # over the largest force, which may be 0
-        (r"reference\.ratio", not body or reference == 0),
+        (r"reference\.ratio", not body or reference == 0 or value_of(case, "tow.mode") == "none"),
         (r"domain", not body),
         (r"domain\.body_widths_needed", summary["concentration"] < 0.445 or value_of(case, "domain.sides") == "open"
          or summary["n_floes"] == 0),

@@ -55,6 +55,7 @@ FREE = {
     "ice.drag.air_form": (0.01, 10, "l"),
     "ice.drag.air_skin": (1e-4, 0.1, "l"),
     "ice.drag.tangential": (0.01, 1, "l"),
+    "ice.drag.sheltering": (0.1, 30, "l"),
     "ice.seed": (1, 1e6, "lm"),
     "ice.shake": (0.1, 100, "l"),
     "ice.thickness_spread": (0.01, 1, "l"),

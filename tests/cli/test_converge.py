@@ -69,7 +69,7 @@ def test_windows_that_are_not_steady_are_counted():
 def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
     """What comes after the line parted is no resistance to a tow."""
     def run(adrift):
-        return SimpleNamespace(window=(10.0, 40.0), adrift=adrift, number=lambda key: 7.0)
+        return SimpleNamespace(window=(10.0, 40.0), adrift=adrift, at_least=None, number=lambda key: 7.0)
     assert converge.mean_resistance(run(np.inf)) == 7.0 and np.isnan(converge.mean_resistance(run(39.0)))
     row, = converge.fields_row(SimpleNamespace(kept=lambda *a: True, measured=lambda *a: np.array([7.0, np.nan])))
     assert converge_text.cells(row)[-1] == "a run has no mean ice resistance"
@@ -80,7 +80,7 @@ def test_steps_that_either_value_does_not_solve_leave_the_comparison_open(missed
     """Of 100 steps of each run; also where only the tighter tolerance is out of reach."""
     def measured(name, fields, measure):
         return np.array([measure(SimpleNamespace(
-            window=(10.0, 40.0), adrift=np.inf,
+            window=(10.0, 40.0), adrift=np.inf, at_least=None,
             number=lambda key, i=i: {"n_steps": 100, "unconverged_steps": missed.get(name, 0)}.get(key, 50.0 + i)))
             for i in fields])
     kind = next(k for k in converge.KINDS if k.name == "tolerance")
@@ -93,7 +93,7 @@ def test_steps_that_either_value_does_not_solve_leave_the_comparison_open(missed
 def test_a_window_without_resistance_has_nothing_to_compare(monkeypatch):
     """Red when it is 0 / 0: field after field is made until the budget is spent."""
     class Empty:
-        window, adrift, steps_per_sample = (10.0, 40.0), np.inf, 1
+        window, adrift, steps_per_sample, at_least = (10.0, 40.0), np.inf, 1, None
         def __init__(self, path): pass
         def __enter__(self): return self
         def __exit__(self, *error): pass

@@ -85,7 +85,7 @@ def test_panels_lie_on_the_hull_and_collisions_on_them(line):
     inward = -np.einsum("tkc,kc->tk", force, normal)[:, flat]
     # a floe that lies nearly flush may lend its own normal
     np.testing.assert_allclose(inward, load[:, flat], rtol=0.02, atol=1e-9)
-    assert (load[:, flat] > 0).sum() > 300
+    assert (load[:, flat] > 0).sum() > 100
     r = rows(line)
     # Each collision lies on its panel.
     near = np.hypot(r["x"][:, None] - middle[None, :, 0], r["y"][:, None] - middle[None, :, 1]).argmin(axis=1)

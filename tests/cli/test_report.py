@@ -152,8 +152,10 @@ def test_says_the_numbers_of_the_run(page, tow):
     body = page.find_element("tag name", "main").text
     mean, low, high = (s[f"mean_ice_resistance{end}_n"] for end in ("", "_low", "_high"))
     name = "mean" if s["window"]["verdict"] == "steady" else "mean over the window"
-    said = re.search(rf"ice resistance, {name}\n([\d.]+) N\n95 % interval ([-\d.]+) to ([-\d.]+) N", body)
-    assert np.allclose([float(v) for v in said.groups()], [mean, low, high], rtol=0.03, atol=0.051 * (high - mean))
+    said = re.search(rf"ice resistance, {name}\n([\d.]+) (k?)N\n95 % interval ([-\d.]+) to ([-\d.]+) \2N", body)
+    value, kilo, *ends = said.groups()
+    assert np.allclose(np.array([value, *ends], float) * (1e3 if kilo else 1), [mean, low, high], rtol=0.03,
+                       atol=0.051 * (high - mean))
     assert s["window"]["verdict"] == "steady" or all(words in body for words in texts(s["window"]["reasons"]))
     assert text(page, ".warning li") == texts(s["warnings"]) and len(s["warnings"]) > 0
     rows = {
