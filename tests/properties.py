@@ -387,9 +387,11 @@ def as_seen(table, folder, seed, parts, number, seen):
     balances(case, folder / "one")
     other, again = result_of(folder, seen.of(case), "other")
     frames = generic(case, folder, "one") if isinstance(seen, Renumbered) else len(one["time"])
-    # A friction that is not unique, a step that is not solved: nothing can be said of what comes after it.
+    # A friction that is not unique, a step that is not solved, or one whose turns leave a corner in another floe, which
+    # the projection finds or not by rounding: nothing can be said of what comes after it.
     for s in (series, again):
-        unsolved = np.flatnonzero(s["unconverged"] + s["unprojected"] + s["restitution_cut"] + s["outrun"])
+        left = np.append(s["overlap"][1:], 0) > 1e-3 * floe_size(case)
+        unsolved = np.flatnonzero(s["unconverged"] + s["unprojected"] + s["restitution_cut"] + s["outrun"] + left)
         frames = min([frames, *(unsolved[:1] + 1)])
     steps = frames - 1
     cut = {k: v[:frames if k in ("place", "yaw", "time") else max(steps, 0)] for k, v in seen.expected(one).items()}

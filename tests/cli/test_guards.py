@@ -190,7 +190,7 @@ def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
         "always", "with a towed body", "with a tow line", "with a tow line of two branches",
         "where collisions are told apart"
     }),
-    (changed(CLOSING, run__duration=1), {"always"}),
+    (changed(CLOSING, run__duration=0.6), {"always"}),
 ])
 def test_each_series_says_when_it_applies(tmp_path, case, has):
     """Numbers where it does and NaN where it does not, as the attribute has it."""

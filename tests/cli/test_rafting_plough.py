@@ -42,14 +42,16 @@ def case(gap):
 
 
 def expected(gap):
-    """Time at which the n floes beyond the first meet the next, what has gone under by then, and the load before."""
+    """Time at which the n floes beyond the first meet the next, what has gone under by then, and the load before: of
+    what lies over the next floe, half is out of the water's sight."""
     tau = RHO_W * SKIN * V**2 * L * B
     time, under, out = gap / V, 0.0, []  # the first floe alone, until it meets the second
     for n in range(1, FLOES - 1):
         u = min(V, np.sqrt(Q0 * B / (n * RHO_W * SKIN * L * B)))
         time += gap / u
-        under += (V / u - 1) * gap * B
-        out.append((n, time, under, min(Q0 * B, n * tau) + tau))
+        more = (V / u - 1) * gap * B
+        under += more
+        out.append((n, time, under, min(Q0 * B, n * tau) + tau * (1 - 0.5 * (under - 0.25 * more) / (L * B))))
     return out
 
 

@@ -334,7 +334,8 @@ def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
 
 def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
     """Red at the 0.02 m/s of the tow: the ice comes at 0.5."""
-    case = changed(ROUND, domain__ends="moving", tow__speed=0.02, water={"current_x": -0.48}, run__dt=10)
+    case = changed(ROUND, domain__ends="moving", tow__speed=0.02, water={"current_x": -0.48}, run__dt=10,
+                   ice__drag__sheltering=0)
     checked = call("check", write_case(tmp_path, case)).stdout
     assert "move 0.198 of their size" in checked and "TOO LARGE" in checked, checked
     assert "solver.reference_speed: 0.02 m/s, and the ice comes at up to 0.494 m/s" in checked, checked
