@@ -111,7 +111,7 @@ BT_INLINE vec update_sheets(bt_batch *o, vec disc, bt_vel *v)
     return bt_larger(bt_size_of(dx), bt_size_of(dy)) * o->wt;
 }
 
-/// As bt_update_contact, with bounds of the normals or NULL; the largest corrections, m/s.
+/// As bt_update_contact, with bounds of the normals or NULL; the largest changes of a row's speed, m/s.
 BT_INLINE vec update(bt_batch *o, const vec *limits, bt_vel *v)
 {
     motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
@@ -137,7 +137,8 @@ BT_INLINE vec update(bt_batch *o, const vec *limits, bt_vel *v)
     o->x[0] = l1, o->x[1] = l2, o->x[2] = t;
     store(v, o->a, o->moves_a, a);
     store(v, o->b, o->moves_b, b);
-    return bt_larger(bt_larger(bt_size_of(d1) * o->w[0], bt_size_of(d2) * o->w[1]), bt_size_of(dt) * o->wt);
+    const vec u1 = o->w[0] * d1 + o->w12 * d2, u2 = o->w12 * d1 + o->w[1] * d2;
+    return bt_larger(bt_larger(bt_size_of(u1), bt_size_of(u2)), bt_size_of(dt) * o->wt);
 }
 
 /// As the update of one contact in project.c: its points one after the other.

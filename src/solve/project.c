@@ -146,6 +146,7 @@ static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, c
 
 static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
+    (void)t;
     const bt_problem *p = context;
     bt_cell *cell = &w->cells->cell[k];
     const bt_vel *d = w->solver->shift;
@@ -154,8 +155,7 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
     bt_rounds_list(cell);
     const bt_found f = in_batches(cell, p->plain) ? bt_batch_projection_residual(cell, slop, d, w->bodies.inv, p)
                                                   : residual_in_place(cell, slop, d, p);
-    t->most = bt_max(t->most, f.most);
-    bt_rounds_found(p, cell, &f, t);
+    bt_rounds_found(cell, &f);
 }
 
 static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -226,7 +226,7 @@ static void part(bt_world *w)
                     .plain = w->par.plain_sweeps};
     bt_rounds_scale(&p, ts);
     bt_work work = {0};
-    bt_rounds_residual(w, &p, false, &work);
+    bt_rounds_residual(w, &p, BT_BEGINS, &work);
     if (p.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
         while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
             work.residual = bt_rounds_sweep(w, &p, &work);

@@ -42,7 +42,6 @@ void bt_rounds_scale(bt_problem *p, const bt_cells *t)
 void bt_rounds_list(bt_cell *cell)
 {
     cell->work.n_list = 0;
-    cell->work.bad = false;
     if (cell->n_contacts <= cell->work.cap_list) return;
     cell->work.cap_list = bt_cells_room(cell->n_contacts);
     free(cell->work.list);
@@ -57,14 +56,11 @@ void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
         k->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
 }
 
-void bt_rounds_found(const bt_problem *p, bt_cell *cell, const bt_found *f, bt_totals *t)
+void bt_rounds_found(bt_cell *cell, const bt_found *f)
 {
-    cell->work.bad = f->bad > 0;
-    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(f->squares * p->per_square, p->most_squares));
-    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)f->rows);
-    bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
-    bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
-    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)f->bad);
+    bt_work_list *o = &cell->work;
+    o->found.most = f->most, o->found.squares = f->squares, o->found.rows = f->rows, o->found.bad = f->bad;
+    o->found.listed = o->n_list;
 }
 
 /// The bodies of the cell of body i may be moved.
@@ -100,7 +96,7 @@ static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take
 }
 
 static double has_list(const bt_cell *cell) { return cell->work.n_list > 0; }
-static double is_bad(const bt_cell *cell) { return cell->work.bad; }
+static double is_bad(const bt_cell *cell) { return cell->work.found.bad > 0; }
 
 /// Collective. Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside
 /// a large body always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last
@@ -131,11 +127,44 @@ static void lists_are_new(bt_world *w)
     bt_phases_distribute(w);
 }
 
-void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work)
+typedef struct {
+    const bt_problem *problem;
+    bool everywhere;
+} residual_pass;
+
+/// May sweeps over the present lists move bodies that the contacts of cell k touch?
+static bool is_touched(const bt_cells *t, bt_idx k)
+{
+    const bt_cell *cell = &t->cell[k];
+    const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
+    bool any = cell->phase == BT_COLOURS;
+    for (int j = 0; j < 4 && !any; j++) any = block[j] >= 0 && t->cell[block[j]].work.swept;
+    return any;
+}
+
+static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    const residual_pass *o = context;
+    const bt_problem *p = o->problem;
+    bt_cell *cell = &w->cells->cell[k];
+    const bool looks = o->everywhere || is_touched(w->cells, k);
+    if (looks) p->residual(w, k, p, t);
+    else cell->work.n_list = cell->work.found.listed;
+    t->most = bt_max(t->most, cell->work.found.most);
+    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(cell->work.found.squares * p->per_square, p->most_squares));
+    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)cell->work.found.rows);
+    bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
+    bt_sum_add(&t->sum[BT_RESIDUAL_CHECKS], looks ? cell->n_contacts : 0);
+    bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
+    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)cell->work.found.bad);
+}
+
+void bt_rounds_residual(bt_world *w, const bt_problem *p, bt_since since, bt_work *work)
 {
     bt_totals t = {.n_sums = BT_RESIDUAL_N};
-    if (settle && p->settle) p->settle(w);
-    bt_phases_any_order(w, p->residual, p, &t);
+    const bool settles = since == BT_SETTLES && p->settle;
+    if (settles) p->settle(w);
+    bt_phases_any_order(w, residual_of_cell, &(residual_pass){p, settles || since == BT_BEGINS}, &t);
     bt_domain_reduce(w, &t);
     work->residual = t.most;
     work->squares = bt_sum_value(&t.sum[BT_RESIDUAL_SQUARES]) / p->per_square;
@@ -143,7 +172,7 @@ void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *
     work->contacts = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_CONTACTS]);
     work->listed = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_LISTED]);
     work->bad = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_BAD]);
-    work->checks += (settle && p->settle ? 2 : 1) * work->contacts;
+    work->checks += (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_CHECKS]) + (settles ? work->contacts : 0);
     lists_are_new(w);
 }
 
@@ -304,7 +333,7 @@ static bool back_to_best(bt_world *w, const bt_problem *p, bt_work *work, double
 {
     if (!(work->residual > p->tolerance && best < work->residual)) return false;
     bt_phases_any_order(w, p->keep, &(bt_keeping){BT_PUT_BACK}, &(bt_totals){0});
-    bt_rounds_residual(w, p, true, work);
+    bt_rounds_residual(w, p, BT_SETTLES, work);
     return true;
 }
 
@@ -336,10 +365,10 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         if (part) keep_near_bad(w);
         settled = run_round(w, p, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
         all = !part;
-        bt_rounds_residual(w, p, settled, work);
+        bt_rounds_residual(w, p, settled ? BT_SETTLES : BT_SWEPT, work);
         if (p->keep && !p->plain && spent(p, work) > fast - HARD * all_work) keep_better(w, p, work, &best);
         if (!settled && work->residual <= p->tolerance) {
-            bt_rounds_residual(w, p, true, work);
+            bt_rounds_residual(w, p, BT_SETTLES, work);
             settled = true;
         }
         if (spent(p, work) < limit || bt_min(best, work->residual) <= FAR * p->tolerance) continue;
@@ -348,7 +377,7 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         all = false;
         fast = spent(p, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;
     }
-    if (!settled) bt_rounds_residual(w, p, true, work);
+    if (!settled) bt_rounds_residual(w, p, BT_SETTLES, work);
     back_to_best(w, p, work, best);
     if (!isinf(best)) bt_phases_any_order(w, p->keep, &(bt_keeping){BT_FORGET}, &(bt_totals){0});
 }

@@ -61,10 +61,14 @@
 #include "space/cells.h"
 #include "space/phases.h"
 
-/// Totals of a residual pass; the largest residual is `most`.
+/// Totals of a residual pass; the largest residual is `most`. CHECKS: contacts whose residual was taken.
 enum {
-    BT_RESIDUAL_SQUARES, BT_RESIDUAL_ROWS, BT_RESIDUAL_CONTACTS, BT_RESIDUAL_LISTED, BT_RESIDUAL_BAD, BT_RESIDUAL_N
+    BT_RESIDUAL_SQUARES, BT_RESIDUAL_ROWS, BT_RESIDUAL_CONTACTS, BT_RESIDUAL_CHECKS, BT_RESIDUAL_LISTED,
+    BT_RESIDUAL_BAD, BT_RESIDUAL_N
 };
+/// What has happened since the last residual pass: the problem is new, or only sweeps over the lists, which leave the
+/// residual of a cell as it was where they move none of its bodies; or velocities are to be formed anew.
+typedef enum { BT_BEGINS, BT_SWEPT, BT_SETTLES } bt_since;
 /// Totals of a sweep; the largest update is `most`.
 enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
@@ -75,7 +79,7 @@ typedef enum { BT_KEEP, BT_PUT_BACK, BT_FORGET } bt_keeping;
 
 /// What is iterated.
 typedef struct bt_problem {
-    bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list) and add up BT_RESIDUAL_...; context: this
+    bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list) and say what it found (bt_rounds_found); context: this
     bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
     bt_visit *keep;       ///< keep the unknowns of a cell, put them back, or forget them; context: bt_keeping. Or NULL
     void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL
@@ -125,8 +129,8 @@ void bt_rounds_list(bt_cell *cell);
 /// Masses of the contacts of a cell that are going to be swept where they are.
 void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv);
 
-/// Collective. A residual pass over all contacts, after a settling if so, and what it found, into *work.
-void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
+/// Collective. What the residual of all contacts is now, into *work.
+void bt_rounds_residual(bt_world *w, const bt_problem *p, bt_since since, bt_work *work);
 
 /// Collective. One sweep over the lists, without momentum; returns the largest update.
 double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
@@ -141,8 +145,8 @@ typedef struct bt_found {
     int64_t rows, bad;    ///< bad: contacts far from the tolerance
 } bt_found;
 
-/// Into the totals: what a residual pass has found in a cell, but for the largest.
-void bt_rounds_found(const bt_problem *p, bt_cell *cell, const bt_found *f, bt_totals *t);
+/// What a residual pass has found in a cell, into its work list.
+void bt_rounds_found(bt_cell *cell, const bt_found *f);
 
 enum { BT_MOVED_FEW = 192 };
 /// Unknowns of the listed contacts of a cell after their move.

@@ -139,22 +139,22 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
 /// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
 static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
+    (void)t;
     const bt_problem *p = context;
     bt_cell *cell = &w->cells->cell[k];
     const bt_vel *v = w->bodies.vel;
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
     bt_found f = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, w->bodies.inv, p) : residual_in_place(cell, v, p);
-    t->most = bt_max(t->most, f.most);
     const bt_tow *line = line_of(w, k);
     if (line) {
         const double r = bt_tow_residual(line, &v[bt_world_towed(w)]);
-        t->most = bt_max(t->most, r);
+        f.most = bt_max(f.most, r);
         f.squares += r * r;
         f.rows++;
         f.bad += r > BT_NEAR * p->tolerance;
     }
-    bt_rounds_found(p, cell, &f, t);
+    bt_rounds_found(cell, &f);
 }
 
 static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -311,7 +311,7 @@ static bt_problem contact_problem(const bt_world *w)
         .vel = w->bodies.vel,
         .tolerance = w->par.tolerance,
         .cap = 0.9,
-        .length = 50,
+        .length = 20,
         .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES),
         .plain = w->par.plain_sweeps,
     };
@@ -335,11 +335,11 @@ static void sweep_to_tolerance(bt_world *w)
     const bt_problem p = contact_problem(w);
     bt_work work = {0};
     const bool pressed = warm_start(w);
-    bt_rounds_residual(w, &p, false, &work);
+    bt_rounds_residual(w, &p, BT_BEGINS, &work);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
     if (pressed && work.residual <= p.tolerance) {
         bt_rounds_sweep(w, &p, &work);
-        bt_rounds_residual(w, &p, false, &work);
+        bt_rounds_residual(w, &p, BT_SWEPT, &work);
     }
     if (work.residual > p.tolerance) bt_rounds_run(w, &p, &work);
     st->sweeps += work.sweeps;

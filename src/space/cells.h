@@ -132,7 +132,11 @@ typedef struct bt_work_list {
     struct bt_unknowns *last;
     bt_idx n_last;
     int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
-    bool bad;                       ///< some contact is not yet near the tolerance
+    struct {
+        double most, squares;
+        int64_t rows, bad;
+        bt_idx listed;
+    } found;                        ///< by the last residual pass that looked at the cell (solve/rounds.h)
     bool kept;                      ///< swept in a round over a part of the field
     bool still;                     ///< they could not in the round before: nothing of theirs moves on
     bool swept;                     ///< listed contacts, here or on another rank, may move its bodies

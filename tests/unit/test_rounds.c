@@ -21,9 +21,11 @@ static bool first(const bt_world *w, bt_idx k) { return k == w->cells->order[0];
 
 static void residual_of(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    (void)context;
-    bt_rounds_list(&w->cells->cell[k]);
-    t->most = bt_max(t->most, made_up.residual[made_up.at]);
+    (void)context, (void)t;
+    bt_cell *cell = &w->cells->cell[k];
+    bt_rounds_list(cell);
+    cell->work.list[cell->work.n_list++] = 0;
+    bt_rounds_found(cell, &(bt_found){.most = made_up.residual[made_up.at], .bad = 1});
 }
 
 static void sweep(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -47,7 +49,8 @@ static void keep(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     }
 }
 
-/// Solve with twenty sweeps of momentum and six without; returns the residual.
+/// Solve with twenty sweeps of momentum and six without; returns the residual. A sweep over the one contact counts for
+/// two against the limit, with the residual after it.
 static double run(const double *residual)
 {
     made_up.sweeps = made_up.at = made_up.puts = 0;
@@ -62,9 +65,11 @@ static double run(const double *residual)
         bt_world_add(w, &d);
     }
     detect_all(w, 0.1);
-    assert_true(w->cells->n_order > 0);
+    assert_int_equal(w->cells->n_order, 1);
+    assert_int_equal(w->cells->n_contacts, 1);
+    w->cells->cell[w->cells->order[0]].work.swept = true;
     const bt_problem p = {.residual = residual_of, .sweep = sweep, .keep = keep, .vel = w->bodies.vel,
-                          .tolerance = 1, .cap = 0.9, .length = 1, .limit = 20};
+                          .tolerance = 1, .cap = 0.9, .length = 1, .limit = 40};
     bt_work work = {.residual = INFINITY};
     bt_rounds_run(w, &p, &work);
     CHECK_CLOSE(work.residual, made_up.residual[made_up.at], 0);
@@ -128,22 +133,22 @@ static void a_solution_is_kept_whatever_came_before(void **state)
 
 enum { LENGTH = 3, SEEN = 3 * LENGTH };
 
-/// Two cells far apart, each with a pair of floes that gains 1 m/s in every sweep over it. The second is listed from
-/// the residual pass after the first round on.
+/// Two pairs of floes in cells side by side. A sweep over the first moves a floe of its own cell, one over the second
+/// its floe in the cell beyond, each by 1 m/s. The second is listed from the residual pass after the first round on.
 static struct {
     int passes[2], sweeps[2];
     double speed[2][SEEN]; ///< as each sweep over it finds it
 } apart;
 
-static int which(const bt_world *w, bt_idx k) { return w->cells->cell[k].x > 2; }
+static int which(const bt_world *w, bt_idx k) { return w->cells->cell[k].x > 0; }
 
 static void list_in_turn(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    (void)context;
+    (void)context, (void)t;
     bt_cell *cell = &w->cells->cell[k];
     bt_rounds_list(cell);
     if (apart.passes[which(w, k)]++ >= which(w, k)) cell->work.list[cell->work.n_list++] = 0;
-    t->most = 9;
+    bt_rounds_found(cell, &(bt_found){.most = 9, .bad = 1});
 }
 
 static void speed_up(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -153,8 +158,9 @@ static void speed_up(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const int c = which(w, k), n = apart.sweeps[c];
     t->most = 1e3;
     if (cell->work.n_list == 0) return;
-    if (n < SEEN) apart.speed[c][n] = w->bodies.vel[cell->first].x, apart.sweeps[c]++;
-    for (bt_idx i = cell->first; i < cell->end; i++) w->bodies.vel[i].x += 1;
+    const bt_cell *moved = c ? &w->cells->cell[cell->right] : cell;
+    if (n < SEEN) apart.speed[c][n] = w->bodies.vel[moved->first].x, apart.sweeps[c]++;
+    w->bodies.vel[moved->first].x += 1;
 }
 
 /// Momentum is that of Nesterov, by what the last sweep has changed, and goes on from one round to the next; of a cell
@@ -168,7 +174,7 @@ static void what_is_new_in_the_lists_has_no_momentum(void **state)
     scene_square(1, v);
     for (int i = 0; i < 4; i++) {
         bt_body_def d = scene_prism(4, v, 900);
-        d.x = i / 2 * 30 + i % 2 + 1, d.y = 2;
+        d.x = (i < 2 ? 1 : 7.9) + i, d.y = 2; // cells of 5 m
         bt_world_add(w, &d);
     }
     detect_all(w, 0.1);
@@ -177,7 +183,8 @@ static void what_is_new_in_the_lists_has_no_momentum(void **state)
     const bt_problem p = {.residual = list_in_turn, .sweep = speed_up, .vel = w->bodies.vel, .tolerance = 1, .cap = 0.9,
                           .length = LENGTH, .limit = SEEN};
     bt_work work = {0};
-    bt_rounds_residual(w, &p, true, &work);
+    assert_int_equal(w->bodies.cell[3][0], 2);
+    bt_rounds_residual(w, &p, BT_BEGINS, &work);
     bt_rounds_run(w, &p, &work);
     double theta = 1, now[2] = {7, 7}, before[2] = {7, 7};
     for (int n = 0; n < 2 * LENGTH; n++) {
@@ -201,6 +208,47 @@ static void what_is_new_in_the_lists_has_no_momentum(void **state)
     bt_world_free(w);
 }
 
+static int looks[2];
+
+static void nothing(bt_world *w) { (void)w; }
+
+static void look(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context, (void)t;
+    looks[w->cells->cell[k].x > 2]++;
+    bt_rounds_list(&w->cells->cell[k]);
+    if (w->cells->cell[k].x <= 2) w->cells->cell[k].work.list[w->cells->cell[k].work.n_list++] = 0;
+    bt_rounds_found(&w->cells->cell[k], &(bt_found){.most = 2, .rows = 1});
+}
+
+/// Of a cell whose bodies no sweep has moved, the residual of before counts, and it is looked at no more; after a
+/// settling all are.
+static void a_residual_is_taken_where_something_moved(void **state)
+{
+    (void)state;
+    bt_world *w = bt_world_create(&(bt_params){.dt = 1, .size = 1, .max_sweeps = 1});
+    double v[8];
+    scene_square(1, v);
+    for (int i = 0; i < 4; i++) {
+        bt_body_def d = scene_prism(4, v, 900);
+        d.x = i / 2 * 30 + i % 2 + 1, d.y = 2;
+        bt_world_add(w, &d);
+    }
+    detect_all(w, 0.1);
+    const bt_problem p = {.residual = look, .settle = nothing, .vel = w->bodies.vel, .tolerance = 1, .per_square = 1};
+    bt_work work = {0};
+    const bt_since since[4] = {BT_BEGINS, BT_SWEPT, BT_SETTLES, BT_SWEPT};
+    for (int n = 0; n < 4; n++) {
+        bt_rounds_residual(w, &p, since[n], &work);
+        CHECK_CLOSE(work.residual, 2, 0);
+        assert_int_equal(work.rows, 2);
+    }
+    assert_int_equal(looks[0], 4);
+    assert_int_equal(looks[1], 2);
+    assert_int_equal(work.checks, 2 + 1 + 4 + 1); // a settling counts as one more look at all
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -209,6 +257,7 @@ int main(void)
         cmocka_unit_test(a_result_far_off_has_further_attempts),
         cmocka_unit_test(a_solution_is_kept_whatever_came_before),
         cmocka_unit_test(what_is_new_in_the_lists_has_no_momentum),
+        cmocka_unit_test(a_residual_is_taken_where_something_moved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
