@@ -32,6 +32,7 @@ typedef struct bt_run_options {
     /// errors then have what comes after
     bool aloud;
     bool held;                ///< the caller has locked dir (src/base/lock.h), and lifts that
+    const char *fields;       ///< folder of fields that other runs have, too (src/field/field_kept.h), NULL = none
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 

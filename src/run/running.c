@@ -27,6 +27,7 @@
 #include "case/case_check.h"
 #include "case/case_files.h"
 #include "case/cost.h"
+#include "field/field_kept.h"
 #include "partition/domain.h"
 #include "base/cores.h"
 #include "base/fileio.h"
@@ -49,11 +50,12 @@ static void clock_part(run *r, double *part)
 
 /// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it.
 /// lead: on rank 0.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
+static bt_status make_field(const bt_comm *comm, const bt_case *c, const char *fields, bt_field *f,
+                            bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
     if (comm->rank == 0) status = bt_cost_fits(c, bt_case_floes_made(c) + c->n_floes, comm, bt_cost_machine(), err);
-    if (comm->rank == 0 && status == BT_OK) status = bt_field_load(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_field_load_kept(fields, c, f, err);
     // a field that was read has only now a number
     if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
@@ -180,7 +182,7 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
     bt_field f;
     bt_field_init(&f);
     bt_lead_stats lead = {0};
-    bt_status status = kept ? bt_running_load_field(&f, &lead, kept) : make_field(r->comm, r->c, &f, &lead, err);
+    bt_status status = kept ? bt_running_load_field(&f, &lead, kept) : make_field(r->comm, r->c, r->o->fields, &f, &lead, err);
     status = bt_comm_agree(r->comm, status);
     clock_part(r, &r->totals.call.ice);
     if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
