@@ -26,7 +26,6 @@ void bt_pair_scratch_free(bt_pair_scratch *s)
     free(s->body);
     free(s->found);
     free(s->name);
-    free(s->sorted);
     free(s->shore.found);
     *s = (bt_pair_scratch){0};
 }
@@ -307,27 +306,20 @@ static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
 {
     const bt_gid *gid = w->bodies.gid;
     bt_pair_search *of = &t->search;
-    if (n > s->cap_sorted) {
-        s->cap_sorted = 2 * n;
-        s->name = bt_realloc(s->name, 2 * s->cap_sorted, sizeof *s->name);
-        s->sorted = bt_realloc(s->sorted, s->cap_sorted, sizeof *s->sorted);
-    }
+    if (n > s->cap_names) s->name = bt_realloc(s->name, 2 * (s->cap_names = 2 * n), sizeof *s->name);
     for (size_t i = 0; i < n; i++) s->name[i] = name_of(gid, &s->found[i], i);
-    bt_named_sort(s->name, s->name + s->cap_sorted, n);
+    bt_named_sort(s->name, s->name + s->cap_names, n);
+    bt_pair *list = bt_realloc(NULL, n, sizeof *list);
     bt_idx k = 0;
     for (size_t i = 0; i < n; i++) {
         bt_named old = {0};
         while (k < of->n_pairs && (old = name_of(gid, &of->pairs[k], 0), bt_named_before(&old, &s->name[i]))) k++;
         const bool stays = k < of->n_pairs && !bt_named_before(&s->name[i], &old);
-        s->sorted[i] = stays ? of->pairs[k] : s->found[s->name[i].at];
+        list[i] = stays ? of->pairs[k] : s->found[s->name[i].at];
     }
-    if (n > (size_t)of->cap_pairs) {
-        of->cap_pairs = bt_cells_room((bt_idx)n);
-        free(of->pairs);
-        of->pairs = bt_realloc(NULL, (size_t)of->cap_pairs, sizeof *of->pairs);
-    }
-    if (n > 0) memcpy(of->pairs, s->sorted, n * sizeof *of->pairs);
-    of->n_pairs = (bt_idx)n;
+    free(of->pairs);
+    of->pairs = list;
+    of->n_pairs = of->cap_pairs = (bt_idx)n;
 }
 
 /// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.

@@ -14,9 +14,8 @@ typedef struct bt_pair_scratch {
     size_t cap_boxes;
     bt_pair *found;       ///< [cap_found]
     size_t cap_found;
-    bt_named *name;       ///< [2][cap_sorted] of those found
-    bt_pair *sorted;      ///< [cap_sorted]
-    size_t cap_sorted;
+    bt_named *name;       ///< [2][cap_names] of those found
+    size_t cap_names;
     bt_shore_list shore;  ///< polygons near a body
 } bt_pair_scratch;
 
