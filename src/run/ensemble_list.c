@@ -156,8 +156,11 @@ void bt_ensemble_list(bt_ensemble *e)
             cost = read ? bt_cost_seconds(&c) : 0;
             alike = read && !bt_case_ice_is_random(&c);
             e->fixed += alike;
-            if (read) bt_field_digest(&c, ice[n_ice].digest), ice[n_ice++].member = i;
-            if (read) e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
+            if (read) {
+                e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
+                bt_field_digest(&c, ice[n_ice].digest);
+                ice[n_ice++].member = i;
+            }
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }
