@@ -182,7 +182,8 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
     bt_field f;
     bt_field_init(&f);
     bt_lead_stats lead = {0};
-    bt_status status = kept ? bt_running_load_field(&f, &lead, kept) : make_field(r->comm, r->c, r->o->fields, &f, &lead, err);
+    bt_status status = kept ? bt_running_load_field(&f, &lead, kept)
+                            : make_field(r->comm, r->c, r->o->fields, &f, &lead, err);
     status = bt_comm_agree(r->comm, status);
     clock_part(r, &r->totals.call.ice);
     if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
