@@ -65,7 +65,7 @@ FUSES := $(shell $(CC) $(EXTRA_CFLAGS) -dM -E -x c /dev/null 2>/dev/null | grep 
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS) $(if $(filter-out 0,$(FUSES)),-fno-tree-vectorize)
 # argp is part of glibc, and a library of its own elsewhere.
 ARGP_LIBS := $(if $(wildcard $(addsuffix /libargp.*,/usr/lib /usr/local/lib)),-largp)
-LDLIBS := $(HDF5_HL) $(HDF5_LIBS) $(MPI_LIBS) $(ARGP_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
+LDLIBS := $(HDF5_HL) $(HDF5_LIBS) $(MPI_LIBS) $(ARGP_LIBS) -lyaml -ljansson -lmetis -lxxhash -lz -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -199,7 +199,7 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 # a C++ compiler and Boost; OpenBLAS's headers for scipy.
 DEPS_MPI := $(if $(MPI_SHOWN)$(MPI_PKG),,libopenmpi-dev)
 DEPS_BUILD := gcc libc6-dev pkg-config $(if $(HDF5),,libhdf5-dev) \
-        librandom123-dev libyaml-dev libmetis-dev libjansson-dev libxxhash-dev
+        librandom123-dev libyaml-dev libmetis-dev libjansson-dev libxxhash-dev zlib1g-dev
 DEPS_DEMO := $(DEPS_BUILD) \
         python3 python3-numpy python3-h5py python3-matplotlib python3-munkres python3-pil python3-yaml python3-jinja2
 DEPS := $(DEPS_DEMO) $(DEPS_MPI) libblas-dev python3-scipy

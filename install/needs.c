@@ -9,6 +9,7 @@
 #include <Random123/philox.h>
 #include <xxhash.h>
 #include <yaml.h>
+#include <zlib.h>
 
 int main(int argc, char **argv)
 {
@@ -23,5 +24,5 @@ int main(int argc, char **argv)
     json_decref(json_integer(yaml_get_version_string() != NULL));
     counter = philox4x64(counter, key);
     return argp_parse(NULL, argc, argv, ARGP_NO_EXIT | ARGP_NO_HELP, NULL, NULL) + omp_get_max_threads() +
-           (int)XXH3_64bits(&counter, sizeof counter);
+           (int)XXH3_64bits(&counter, sizeof counter) + (*zlibVersion() == 0);
 }

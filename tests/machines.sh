@@ -60,7 +60,8 @@ Dir::Cache "$folder/apt/cache"; Dir::Etc::sourcelist "$folder/sources.list"; Dir
 END
   apt-get -qq -c "$folder/apt.conf" update
   apt-get -qq -c "$folder/apt.conf" install -y --download-only libhdf5-openmpi-dev libopenmpi-dev libmetis-dev \
-    libyaml-dev libjansson-dev libxxhash-dev librandom123-dev libgomp1 libc6-dev libcmocka-dev >"$folder/apt.log"
+    libyaml-dev libjansson-dev libxxhash-dev zlib1g-dev librandom123-dev libgomp1 libc6-dev \
+    libcmocka-dev >"$folder/apt.log"
   for package in "$folder"/apt/cache/archives/*.deb; do dpkg -x "$package" "$root"; done
   # links to the root of a machine lead out of this one; without libm.so its static half would be taken
   find "$lib" -maxdepth 1 -lname '/*' | while read -r link; do ln -sf "$root$(readlink "$link")" "$link"; done

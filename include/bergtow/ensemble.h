@@ -9,6 +9,9 @@
 // the process died before it wrote the line; the next call adds that). DIR/ensemble.h5 (src/run/ensemble_file.c) is
 // made anew from the members' files: nothing in it depends on order, ranks, or how often the ensemble was stopped.
 //
+// Fields. Where conditions have their ice in common (`fields: common`, or ice from a file), DIR/fields holds each field
+// that was made or read, under the digest of all it follows from (src/field/field_kept.h), until all is finished.
+//
 // Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest
 // (src/run/ensemble_record.h). Each call reads them all and compares them, shared among its ranks, before it begins (as
 // fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each maker of

@@ -23,6 +23,7 @@ typedef struct bt_run_options {
     int64_t dump_step;        ///< write the contact problem of this step, −1 = none
     const char *dump_path;    ///< to this FCLIB file
     const char *command_line; ///< for the provenance
+    double began;             ///< bt_clock when the program was started for this run alone, 0 = it was not
     /// a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for;
     /// or NULL
     volatile sig_atomic_t *stop_signal;
@@ -31,6 +32,7 @@ typedef struct bt_run_options {
     /// errors then have what comes after
     bool aloud;
     bool held;                ///< the caller has locked dir (src/base/lock.h), and lifts that
+    const char *fields;       ///< folder of fields that other runs have, too (src/field/field_kept.h), NULL = none
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 

@@ -30,6 +30,9 @@ bt_moments bt_shape_moments(int n, const double *v);
 /// The same without ∫ r³ dA, which stays 0: two asinh an edge are two thirds of the work, and only drag asks for it.
 bt_moments bt_shape_extent(int n, const double *v);
 
+/// Area and centroid alone, to the same bits; the others stay 0.
+bt_moments bt_shape_centroid(int n, const double *v);
+
 /// Why a polygon cannot be a body, or NULL: too few or many vertices, clockwise, not convex, zero area,
 /// repeated vertices. The text is a static string that completes "... is refused: ".
 const char *bt_shape_fault(int n, const double *v);

@@ -4,6 +4,7 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
+#include "base/launcher.h"
 #include "base/largest.h"
 #include "case/case_base.h"
 
@@ -85,7 +86,7 @@ static const struct argp resume_argp = {.options = resume_options,
 
 int bt_cmd_resume(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1, .aloud = true}};
+    options o = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
     char *command_line = bt_cmd_join(argc, argv);
     bt_cmd_parse(&resume_argp, argc, argv, &o);
     const bt_comm *comm = bt_comm_world();

@@ -5,6 +5,7 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/largest.h"
+#include "base/launcher.h"
 #include "output/folder.h"
 
 #include <inttypes.h>
@@ -84,7 +85,7 @@ static bt_status check_dump(const bt_run_options *run, const bt_case *c, bt_erro
 
 int bt_cmd_run(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1, .aloud = true}};
+    options o = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
     char *command_line = bt_cmd_join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &o);

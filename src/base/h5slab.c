@@ -36,10 +36,10 @@ static bt_slab describe(bt_h5 *h, hid_t type, int64_t n, int width)
 bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int width, bool packed)
 {
     bt_slab s = describe(h, type, n, width);
-    packed = packed && !bt_h5_shared(h) && (size_t)n * s.row_bytes > SMALL;
-    if (!packed && n > 0) s.piece = n;
+    s.packed = packed && !bt_h5_shared(h) && (size_t)n * s.row_bytes > SMALL;
+    if (!s.packed && n > 0) s.piece = n;
     s.dataset = bt_h5_dataset(h, name, type, width ? 2 : 1, (hsize_t[]){(hsize_t)n, (hsize_t)width},
-                              packed ? (hsize_t)s.piece : 0);
+                              s.packed ? (hsize_t)s.piece : 0);
     return s;
 }
 
@@ -47,8 +47,9 @@ bt_slab bt_slab_growing(bt_h5 *h, const char *name, hid_t type, int64_t n, int w
 {
     bt_slab s = describe(h, type, n, width);
     s.growing = true;
+    s.packed = !bt_h5_shared(h);
     s.dataset = bt_h5_growing(h, name, type, width ? 3 : 2, (hsize_t[]){(hsize_t)n, (hsize_t)width},
-                              (hsize_t[]){1, (hsize_t)s.piece}, !bt_h5_shared(h));
+                              (hsize_t[]){1, (hsize_t)s.piece}, s.packed);
     return s;
 }
 
@@ -90,6 +91,12 @@ bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k)
 
 void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows)
 {
+    const bool whole = first % s->piece == 0 && (n == s->piece || first + n == s->n);
+    if (s->packed && whole && n <= s->piece) {
+        bt_h5_write_chunk(s->h, s->dataset, s->growing, (hsize_t)s->frame, (hsize_t)first, (size_t)n, (size_t)s->piece,
+                          s->row_bytes, rows);
+        return;
+    }
     if (!bt_h5_shared(s->h)) {
         bt_h5_write_rows(s->h, s->dataset, s->type, s->growing, (hsize_t)s->frame, (hsize_t)first, (hsize_t)n, rows);
         return;

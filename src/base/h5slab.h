@@ -13,7 +13,7 @@ typedef struct bt_slab {
     int64_t n;            ///< rows of all ranks
     int width;
     size_t row_bytes;
-    bool growing;
+    bool growing, packed;
     int64_t frame;        ///< the frame that is written now
     int64_t piece;        ///< rows that lie together in the file
     uint64_t *address;    ///< [pieces] bytes from the start of the file, after bt_slab_share; NULL on one rank

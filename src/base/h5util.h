@@ -14,6 +14,7 @@ typedef struct bt_h5 {
     int raw;        ///< descriptor for bt_h5_write_raw, −1 on one rank
     char *path;
     bt_status status;
+    struct bt_deflater *deflater; ///< of bt_h5_write_chunk, NULL before its first call
     int *errnum;    ///< first error of the file system, see h5driver.h
     bt_errors *err; ///< where the next error goes; the caller of each public function sets it
 } bt_h5;
@@ -68,6 +69,9 @@ void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t 
 /// Rows first up to first + n of a dataset [rows]... or, if it has frames, [frame][rows]...
 void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n,
                       const void *rows);
+/// The same for all rows of a packed chunk of `room` rows, the first n of them given and zeros behind them.
+void bt_h5_write_chunk(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t first, size_t n, size_t room,
+                       size_t row_bytes, const void *rows);
 /// Where in the file a row lies, in bytes; of a dataset that is not packed, in a shared file.
 uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t row);
 /// Bytes to a place in a shared file, from any rank.

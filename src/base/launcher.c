@@ -7,7 +7,11 @@
 // BERGTOW_MPI=yes helps where none of them is there.
 #include "base/launcher.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
 
 // In this order, for a launcher may itself have been started by another: mpirun within a job starts its servers with
 // srun, whose variables are then those of the servers.
@@ -59,4 +63,21 @@ void bt_launcher_forget(void)
         unsetenv(kinds[i].rank);
         if (kinds[i].size) unsetenv(kinds[i].size);
     }
+}
+
+double bt_launcher_began(void)
+{
+    enum { BEFORE = 19 }; // fields of proc_pid_stat(5) behind the name, before starttime
+    char text[1024] = "";
+    FILE *f = fopen("/proc/self/stat", "r");
+    if (f && !fgets(text, sizeof text, f)) *text = '\0';
+    if (f) fclose(f);
+    const char *p = strrchr(text, ')'); // a name may hold anything
+    for (int k = 0; p && k <= BEFORE; k++) p = strchr(p + 1, ' ');
+    const double now = bt_clock(), ticks = p ? strtod(p, NULL) : 0;
+    struct timespec since_boot;
+    if (!(ticks > 0) || clock_gettime(CLOCK_BOOTTIME, &since_boot) != 0) return now;
+    const double age = (double)since_boot.tv_sec + 1e-9 * (double)since_boot.tv_nsec -
+                       ticks / (double)sysconf(_SC_CLK_TCK);
+    return now - bt_max(0, age);
 }

@@ -13,6 +13,10 @@ typedef struct bt_launcher {
 
 bt_launcher bt_launcher_find(void);
 
+/// bt_clock when the system started this process, before any library was loaded, to a hundredth of a second; where it
+/// does not say: now.
+double bt_launcher_began(void);
+
 /// What this process starts from here on has not been started by a launcher: it would take itself for this rank.
 void bt_launcher_forget(void);
 

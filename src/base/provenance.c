@@ -9,6 +9,8 @@
 
 #include "revision.h"
 
+const char *bt_provenance_revision(void) { return BT_REVISION; }
+
 void bt_provenance_write(bt_h5 *h, const char *command_line)
 {
     char host[256] = "unknown", mpi[MPI_MAX_LIBRARY_VERSION_STRING], text[sizeof mpi + 60];

@@ -5,6 +5,9 @@
 
 #include "base/h5util.h"
 
+/// The revision that this program was built from, "unknown" where the build did not know.
+const char *bt_provenance_revision(void);
+
 void bt_provenance_write(bt_h5 *h, const char *command_line);
 
 #endif

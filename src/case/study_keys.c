@@ -31,7 +31,7 @@ const bt_key bt_study_keys[] = {
     WHOLE("repeats", "1", "[1, 100000]", "fields of each condition; 1 where no ice depends on the seed, as it is read"),
     WHOLE("seed", "1", "[0, 9.2e18]", "from it follow the seeds of the fields, and the Latin hypercube"),
     CHOICE("fields", fields, "own",
-           "fields of each condition: its own, or the same in all, to compare conditions on the same ice"),
+           "fields of each condition: its own, or the same in all, made once, to compare conditions on the same ice"),
     WHOLE("ranks", "1", "[1, 1048576]", "MPI ranks that work on one member"),
 };
 const int bt_n_study_keys = sizeof bt_study_keys / sizeof *bt_study_keys;

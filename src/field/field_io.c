@@ -227,7 +227,7 @@ static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *sto
     char why[BT_ICE_WHY];
     const bt_ice_floe given = {n, v, p[0], p[1], p[2], f->thickness[i], stored_area ? stored_area[i] : NAN, 1e-9};
     if ((fault = bt_ice_floe_fault(&given, why, NULL))) bt_refuse(&r->r, "floe %d: %s", i, fault);
-    f->area[i] = stored_area ? stored_area[i] : bt_shape_moments(n, v).area;
+    f->area[i] = stored_area ? stored_area[i] : bt_shape_centroid(n, v).area;
 }
 
 static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)

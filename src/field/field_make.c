@@ -103,7 +103,7 @@ static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n
     for (int effort = 0;; effort++) {
         bt_tessellation cells = bt_tessellation_saw(y, n, target, aspect, c->ice.seed, effort);
         double fill = 0;
-        for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
+        for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_centroid(cells.nv[i], cells.v[i]).area;
         if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
         bt_tessellation_free(&cells);
     }
@@ -158,7 +158,7 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
     double *goal = bt_alloc((size_t)cells->n, sizeof *goal), *clearance = bt_alloc((size_t)cells->n, sizeof *clearance);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
-        bt_moments m = bt_shape_moments(cells->nv[i], cells->v[i]);
+        bt_moments m = bt_shape_centroid(cells->nv[i], cells->v[i]);
         bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_ORIENT, i);
         double yaw = 2 * BT_PI * bt_rng_uniform(&r);
         bt_idx k = f->n;

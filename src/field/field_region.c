@@ -28,7 +28,7 @@ static double area_inside(const bt_region *y, int n, const double *v)
     n = bt_shape_clip(n, a, 1, 0, y->x1, b);
     n = bt_shape_clip(n, b, 0, -1, -y->y0, a);
     n = bt_shape_clip(n, a, 0, 1, y->y1, b);
-    return n >= 3 ? bt_shape_moments(n, b).area : 0;
+    return n >= 3 ? bt_shape_centroid(n, b).area : 0;
 }
 
 // Of a convex part of a floe, with its images over the edges at which the domain wraps.
@@ -88,7 +88,7 @@ static void box_about(int n, const double *v, double clearance, double box[8])
 static bool add_obstacle(bt_region *y, int n, const double *v, bool part)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
-    bt_moments m = bt_shape_moments(n, v);
+    bt_moments m = bt_shape_extent(n, v);
     // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
     double grow = 1 + y->clearance / bt_max(m.inradius, 1e-9 * m.radius);
     const bool sliver = grow > MOST_GROWTH;
@@ -280,7 +280,7 @@ int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
         double best_area = 0;
         for (int e = 0; e < m; e++) {
             int nt = cut_outside(n, v, m, outline, e, trial);
-            double area = nt >= 3 ? bt_shape_moments(nt, trial).area : 0;
+            double area = nt >= 3 ? bt_shape_centroid(nt, trial).area : 0;
             if (area > best_area) {
                 best_area = area;
                 n_best = nt;

@@ -84,7 +84,7 @@ static void add_floes(bt_world *w, const bt_case *c, const bt_field *f, double s
     for (bt_idx i = 0; i < f->n; i++) {
         int nv = (int)(f->offsets[i + 1] - f->offsets[i]);
         const double *v = f->vertices + 2 * f->offsets[i];
-        bt_moments m = bt_shape_moments(nv, v);
+        bt_moments m = bt_shape_extent(nv, v);
         bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_SHAKE, stage << 32 | i);
         double speed = sqrt(median / m.area), heading = 2 * BT_PI * bt_rng_uniform(&r),
                spin = bt_rng_uniform(&r) < 0.5 ? -1 : 1;

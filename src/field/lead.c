@@ -101,7 +101,7 @@ static void long_axis(int n, const double *v, double axis[2])
 /// Drop vertices at short edges: what stays is convex and lies within.
 static int drop_short_edges(int n, double *v)
 {
-    const double shortest = SHORT_EDGE * sqrt(bt_shape_moments(n, v).area);
+    const double shortest = SHORT_EDGE * sqrt(bt_shape_centroid(n, v).area);
     for (int i = 0; i < n && n > 3;) {
         const int j = i + 1 < n ? i + 1 : 0;
         if (bt_hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]) >= shortest) {
@@ -181,7 +181,7 @@ static void mark(const strip *s, const bt_field *f, uint8_t *taken, bt_lead_stat
     for (bt_idx i = 0; i < f->n; i++) {
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
         const double *v = outline + 2 * f->offsets[i];
-        taken[i] = overlaps(s, n, v, bt_shape_moments(n, v).radius, f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1]);
+        taken[i] = overlaps(s, n, v, bt_shape_extent(n, v).radius, f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1]);
         if (!taken[i]) continue;
         st->taken++;
         st->area_taken += f->area[i];

@@ -103,6 +103,10 @@ static bool nearest(uint64_t w, int k, double *x)
         100000000000000u, 1000000000000000u, 10000000000000000u, 100000000000000000u, 1000000000000000000u,
         10000000000000000000u};
     const uint64_t power = powers[k];
+    if (w >> 53 == 0) { // w and a power up to 10²² are doubles themselves, and a division is rounded once
+        *x = (double)w / (double)power;
+        return true;
+    }
     const bt_uint128 units = (bt_uint128)w << 64, q = units / power;
     *x = (double)(q | (q * power != units)) * 0x1p-64;
     return q >> 55 > 0;

@@ -42,7 +42,7 @@ static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
     int n = bt_tessellation_clear(y, 4, v, effort == 0);
     if (n >= 3) n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
-    double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_moments(n, v).area : 0;
+    double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_centroid(n, v).area : 0;
     // Halves waste less water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {
         double cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
@@ -53,7 +53,7 @@ static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x
     }
     if (n < 3) return;
     // What an obstacle leaves of a piece must still be a piece.
-    bt_moments m = bt_shape_moments(n, v);
+    bt_moments m = bt_shape_extent(n, v);
     if (m.area < 0.25 * whole || m.inradius < 0.2 * bt_min(x1 - x0, y1 - y0) / 2) return;
     if ((c->n & (c->n - 1)) == 0) { // full at powers of two
         size_t cap = c->n ? 2 * (size_t)c->n : 1;

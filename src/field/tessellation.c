@@ -32,6 +32,7 @@ enum {
 // discs of this part of the cell's radius do not overlap at the start: disorder of the ice
 static const double SPACING = 0.66;
 static const double STEP = 0.9;     // ω
+static const double SURE = 1 + 1e-12;  // beyond this, squares compare as what they are squares of
 static const double SHORT_EDGE = 0.07; // shortest edge kept / diameter of equal area
 static const double SLIVER = 0.16;     // least inradius / radius of equal area
 
@@ -44,7 +45,7 @@ typedef struct diagram {
     int nx, ny;       // bins
     double bx, by;    // their sides
     bt_idx *first;    // [nx*ny+1]
-    bt_idx *member;   // [n]
+    struct { double x, y, w; bt_idx i; } *member; // [n] the seeds again, those of a bin in a row
 } diagram;
 
 static bt_tessellation create(bt_idx n)
@@ -84,7 +85,11 @@ static void sort_into_bins(diagram *g)
     for (size_t b = 0; b < bins; b++) g->first[b + 1] += g->first[b];
     bt_idx *at = bt_alloc(bins, sizeof *at);
     memcpy(at, g->first, bins * sizeof *at);
-    for (bt_idx i = 0; i < g->n; i++) g->member[at[bin_of(g, g->p[2 * i], g->p[2 * i + 1])]++] = i;
+    for (bt_idx i = 0; i < g->n; i++) {
+        const double x = g->p[2 * i], y = g->p[2 * i + 1];
+        const bt_idx k = at[bin_of(g, x, y)]++;
+        g->member[k].x = x, g->member[k].y = y, g->member[k].w = g->w[i], g->member[k].i = i;
+    }
     free(at);
 }
 
@@ -95,20 +100,30 @@ static double reach2(int n, const double *v)
     return r2;
 }
 
+// Does a vertex lie beyond the line dx·x + dy·y = rhs?
+static bool reached(int n, const double *v, double dx, double dy, double rhs)
+{
+    double far = -INFINITY;
+    for (int k = 0; k < n; k++) far = bt_max(far, dx * v[2 * k] + dy * v[2 * k + 1] - rhs);
+    return far > 0;
+}
+
 // Cut the cell (relative to seed i) by the seeds of one bin, shifted by a period. Returns the new count.
 static int cut_by_bin(const diagram *g, bt_idx i, int n, double *v, double *r, bt_idx bin, double sx, double sy)
 {
     double out[2 * WORK];
+    const double px = g->p[2 * i], py = g->p[2 * i + 1], w = g->w[i];
     for (bt_idx k = g->first[bin]; k < g->first[bin + 1]; k++) {
-        bt_idx j = g->member[k];
-        if (j == i) continue;
-        double dx = g->p[2 * j] + sx - g->p[2 * i], dy = g->p[2 * j + 1] + sy - g->p[2 * i + 1];
-        double d2 = dx * dx + dy * dy, d = sqrt(d2), rhs = 0.5 * (d2 + g->w[i] - g->w[j]);
-        if (rhs >= d * *r) continue;
-        if (d == 0) { // coincident seeds: the heavier one, then the lower index, has the cell
-            if (g->w[j] > g->w[i] || (g->w[j] == g->w[i] && j < i)) return 0;
+        const double dx = g->member[k].x + sx - px, dy = g->member[k].y + sy - py, wj = g->member[k].w,
+                     d2 = dx * dx + dy * dy, rhs = 0.5 * (d2 + w - wj);
+        if (rhs > 0 && rhs * rhs > SURE * d2 * *r * *r) continue; // most: without a root
+        const bt_idx j = g->member[k].i;
+        if (j == i || rhs >= sqrt(d2) * *r) continue;
+        if (d2 == 0) { // coincident seeds: the heavier one, then the lower index, has the cell
+            if (wj > w || (wj == w && j < i)) return 0;
             continue;
         }
+        if (!reached(n, v, dx, dy, rhs)) continue;
         int m = bt_shape_clip(n, v, dx, dy, rhs, out);
         if (m < 3) return 0;
         if (m == n && memcmp(out, v, 2 * (size_t)n * sizeof *v) == 0) continue;
@@ -329,7 +344,7 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
         for (bt_idx i = 0; i < n; i++) {
             double v[2 * 2 * WORK];
             int m = ice_cell(&g, i, v);
-            bt_moments mo = m >= 3 ? bt_shape_moments(m, v) : (bt_moments){.cx = g.p[2 * i], .cy = g.p[2 * i + 1]};
+            bt_moments mo = m >= 3 ? bt_shape_centroid(m, v) : (bt_moments){.cx = g.p[2 * i], .cy = g.p[2 * i + 1]};
             area[i] = mo.area;
             next[2 * i] = mo.cx;
             next[2 * i + 1] = mo.cy;
@@ -350,9 +365,9 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
         double v[2 * 2 * WORK];
         int m = ice_cell(&g, i, v);
         if (m < 3) continue;
-        double full = bt_shape_moments(m, v).area;
+        double full = bt_shape_centroid(m, v).area;
         m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
-        bt_moments mo = bt_shape_moments(m, v);
+        bt_moments mo = bt_shape_extent(m, v);
         if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
         cells.nv[i] = m;
         memcpy(cells.v[i], v, 2 * (size_t)m * sizeof *v);

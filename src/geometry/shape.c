@@ -30,7 +30,7 @@ static double cubic_antiderivative(double h, double s)
     return h / 5 * (s * (2 * s * s + 5 * h2) * r / 8 + 0.375 * h2 * h2 * bt_asinh(s / fabs(h)));
 }
 
-static bt_moments moments(int n, const double *v, bool cubic)
+bt_moments bt_shape_centroid(int n, const double *v)
 {
     bt_moments m = {0};
     if (n < 1) return m;
@@ -50,6 +50,13 @@ static bt_moments moments(int n, const double *v, bool cubic)
     // A polygon without area is a fault of the caller's data; the mean of the vertices keeps the answer finite.
     m.cx = v[0] + (a2 != 0 ? sx / (3 * a2) : mean_x);
     m.cy = v[1] + (a2 != 0 ? sy / (3 * a2) : mean_y);
+    return m;
+}
+
+static bt_moments moments(int n, const double *v, bool cubic)
+{
+    bt_moments m = bt_shape_centroid(n, v);
+    if (n < 1) return m;
     m.inradius = INFINITY;
     for (int i = 0; i < n; i++) {
         int j = i + 1 < n ? i + 1 : 0;

@@ -322,7 +322,9 @@ static void conclude(bt_record *r, const bt_run_totals *t)
 
 static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_errors *err)
 {
-    char *text = bt_summary_json(&r->summary, &r->history, r->c, t, r->n_floes);
+    bt_run_totals all = *t; // with the time up to here
+    all.call.end = t->stepped > 0 ? bt_clock() - t->stepped : 0;
+    char *text = bt_summary_json(&r->summary, &r->history, r->c, &all, r->n_floes);
     const bt_status status = bt_record_write_text(r, "summary.json", text, err);
     free(text);
     return status;

@@ -156,6 +156,22 @@ typedef struct bt_frame_line {
     double tension[BT_FRAME_BRANCHES];     ///< N
 } bt_frame_line;
 
+/// Parts of the wall time of a call: X(name, of what).
+#define BT_CALL_PARTS(X)                                                                                               \
+    X(program, "the start of the program, its libraries, and the case or checkpoint read")                             \
+    X(ice, "making or reading the ice, the lead in it, and its way to all ranks")                                      \
+    X(world, "bodies, velocities at the start, the check that nothing overlaps, the first cells")                      \
+    X(record, "the folder and the result file, with the bodies in it")                                                 \
+    X(steps, "the steps, with frames and checkpoints: phases_s has them all")                                          \
+    X(end, "the last look at the state, the numbers of the whole run, the files closed")
+
+/// Wall time of the call by parts, s.
+typedef struct bt_call {
+#define BT_MEMBER_OF_CALL(name, text) double name;
+    BT_CALL_PARTS(BT_MEMBER_OF_CALL)
+#undef BT_MEMBER_OF_CALL
+} bt_call;
+
 /// Numbers of the end of the run that the series do not hold.
 typedef struct bt_run_totals {
     int64_t n_steps, whole_steps; ///< taken, and of the whole duration
@@ -176,6 +192,8 @@ typedef struct bt_run_totals {
     const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     const struct bt_undisturbed *undisturbed; ///< ice, at the end of the run; NULL where no body is towed
     bt_phases phases;
+    bt_call call;                ///< `end` is that of the summary's own time
+    double stepped;              ///< bt_clock after the last step of this call
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "output/checkpoint.h"
+#include "field/field_kept.h"
 #include "bergtow/run.h"
 #include "run/ensemble_folder.h"
 #include "run/ensemble_journal.h"
@@ -201,7 +202,8 @@ static bt_status run_member(bt_ensemble *e, bt_entry *x)
                                   .max_wall = e->o->max_wall > 0 ? bt_max(1e-3, bt_ensemble_wall_left(e)) : 0,
                                   .stop_signal = &stop_signal,
                                   .command_line = e->o->command_line,
-                                  .held = true};
+                                  .held = true,
+                                  .fields = x->shares ? e->fields : NULL};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
     }
@@ -388,6 +390,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     if (comm->rank == 0) {
         const bt_status gathered = gather(&e, true);
         if (!o->job) status = bt_ensemble_tell_end(&e, status, err);
+        if (!o->job && status == BT_OK) bt_field_forget_kept(e.fields);
         if (status == BT_OK) status = gathered;
     }
     bt_comm_split_end(&group);
@@ -396,6 +399,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         free(e.list[i].folder);
     }
     free(e.list);
+    free(e.fields);
     bt_study_files_free(&e.files);
     bt_member_records_end(&e.records);
     bt_member_notes_free(&e.warnings);

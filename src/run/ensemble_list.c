@@ -12,6 +12,7 @@
 #include "base/lock.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
+#include "field/field_kept.h"
 #include "run/ensemble_journal.h"
 #include "run/ensemble_member.h"
 
@@ -112,13 +113,35 @@ static void check_members(bt_ensemble *e)
     free(found);
 }
 
+typedef struct { char digest[BT_CHECKSUM_DIGEST]; int64_t member; } ice_of;
+
+static int by_digest(const void *a, const void *b)
+{
+    const ice_of *p = a, *q = b;
+    return strcmp(p->digest, q->digest);
+}
+
+/// Which conditions have their ice in common, by that of the first field of each; in the order of the study.
+static void find_shared(bt_ensemble *e, ice_of *ice, int64_t n)
+{
+    qsort(ice, (size_t)n, sizeof *ice, by_digest);
+    for (int64_t k = 1; k < n; k++) {
+        if (by_digest(&ice[k - 1], &ice[k])) continue;
+        for (int64_t r = 0; r < e->s->repeats; r++)
+            e->list[ice[k - 1].member + r].shares = e->list[ice[k].member + r].shares = true;
+    }
+    e->fields = bt_text_of("%s/fields", e->o->dir);
+}
+
 void bt_ensemble_list(bt_ensemble *e)
 {
     e->n = bt_study_n_members(e->s);
     e->list = bt_alloc((size_t)e->n, sizeof *e->list);
     const bool limited = e->o->max_wall > 0;
     double cost = 0;
-    int64_t priced = -1;
+    bool alike = false;
+    int64_t priced = -1, n_ice = 0;
+    ice_of *ice = bt_alloc((size_t)e->s->n_conditions, sizeof *ice);
     for (int64_t i = 0; i < e->n; i++) {
         bt_entry *x = &e->list[i];
         x->index = i;
@@ -131,17 +154,25 @@ void bt_ensemble_list(bt_ensemble *e)
             priced = x->m.condition;
             const bool read = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK;
             cost = read ? bt_cost_seconds(&c) : 0;
-            e->fixed += read && !bt_case_ice_is_random(&c);
-            if (read) e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
+            alike = read && !bt_case_ice_is_random(&c);
+            e->fixed += alike;
+            if (read) {
+                e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
+                bt_field_digest(&c, ice[n_ice].digest);
+                ice[n_ice++].member = i;
+            }
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }
         x->cost = cost;
+        x->shares = alike && e->s->repeats > 1;
         x->turn = limited ? x->m.repeat : 0;
         x->first = limited && e->s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? 0 : cost;
         x->attempts = bt_member_attempts(x->folder);
         bt_entry_look(x);
     }
+    find_shared(e, ice, n_ice);
+    free(ice);
     check_members(e);
     qsort(e->list, (size_t)e->n, sizeof *e->list, by_turn);
 }

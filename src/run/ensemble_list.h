@@ -18,6 +18,7 @@ typedef struct bt_entry {
     /// within a turn the largest comes first: the cost; 0 where wall time is limited and the conditions are a random
     /// sample: those that are done are to be one, too, and the costly ones alone have another mean
     double first;
+    bool shares;   ///< another condition has the same field
     bool settled;  ///< finished or failed, as far as this process knows
     bool busy;     ///< a run of another kind (bergtow resume) had the folder when this process wanted it
     bool paused;   ///< has done the steps that this call was to do
@@ -32,6 +33,7 @@ typedef struct bt_ensemble {
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
     double most_floes;  ///< of the member with the most
+    char *fields;       ///< folder of the fields that members share
     int64_t fixed;      ///< conditions whose ice does not depend on the seed
     int n_groups, of_group, threads, jobs;
     int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/lock.h)

@@ -35,6 +35,7 @@ typedef struct bt_running {
     uint64_t asked;          ///< what some rank has been asked for after the last step (halt.h)
     int64_t first_step, end_step; ///< of this call
     double began;            ///< bt_clock when its steps began
+    double clocked;          ///< bt_clock at the end of the last part of the call that has been timed
     int64_t frames_due;      ///< frames by the interval, so far
     int64_t frames;          ///< frames taken, but for one that the end of --steps has added
     int64_t framed;          ///< step of the last frame, −1 = none in this call

@@ -27,6 +27,7 @@
 #include "case/case_check.h"
 #include "case/case_files.h"
 #include "case/cost.h"
+#include "field/field_kept.h"
 #include "partition/domain.h"
 #include "base/cores.h"
 #include "base/fileio.h"
@@ -39,13 +40,22 @@ typedef bt_running run;
 
 // --- begin -----------------------------------------------------------------------------------------------------------
 
+/// Add the time since the last part of the call to this one.
+static void clock_part(run *r, double *part)
+{
+    const double now = bt_clock();
+    *part += now - r->clocked;
+    r->clocked = now;
+}
+
 /// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it.
 /// lead: on rank 0.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
+static bt_status make_field(const bt_comm *comm, const bt_case *c, const char *fields, bt_field *f,
+                            bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
     if (comm->rank == 0) status = bt_cost_fits(c, bt_case_floes_made(c) + c->n_floes, comm, bt_cost_machine(), err);
-    if (comm->rank == 0 && status == BT_OK) status = bt_field_load(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_field_load_kept(fields, c, f, err);
     // a field that was read has only now a number
     if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
@@ -109,6 +119,7 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
         .lead = *lead,
         .outlines = f->outlines,
         .tolerance = r->w->par.tolerance,
+        .call = r->totals.call,
     };
     if (r->comm->rank == 0) {
         r->field = *f;
@@ -171,8 +182,10 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
     bt_field f;
     bt_field_init(&f);
     bt_lead_stats lead = {0};
-    bt_status status = kept ? bt_running_load_field(&f, &lead, kept) : make_field(r->comm, r->c, &f, &lead, err);
+    bt_status status = kept ? bt_running_load_field(&f, &lead, kept)
+                            : make_field(r->comm, r->c, r->o->fields, &f, &lead, err);
     status = bt_comm_agree(r->comm, status);
+    clock_part(r, &r->totals.call.ice);
     if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
     if (status == BT_OK) {
         if (r->comm->rank == 0 && r->o->dir) r->identity = bt_running_identity(r->c, &f, kept);
@@ -186,6 +199,7 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
         r->first_step = r->w->step;
     }
     bt_field_free(&f);
+    clock_part(r, &r->totals.call.world);
     return status;
 }
 
@@ -199,11 +213,14 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
     const double energy = r->guard.energy; // of the start, from a checkpoint
     bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
     if (energy > 0) r->guard.energy = energy;
-    r->began = bt_clock();
+    clock_part(r, &r->totals.call.record);
+    r->began = r->clocked;
     if (!fresh) return BT_OK;
     r->frames_due = 1;
     r->frames = bt_running_draws(r->c);
-    return r->frames ? record_frame(r, err) : BT_OK;
+    const bt_status status = r->frames ? record_frame(r, err) : BT_OK;
+    r->totals.phases.output += bt_clock() - r->began;
+    return status;
 }
 
 bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
@@ -219,6 +236,8 @@ bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c,
                         .first = comm->rank == 0,
                         .started = m->start};
     r->until = m->until;
+    r->clocked = o->began > 0 ? o->began : m->start;
+    clock_part(r, &r->totals.call.program);
     // before the field is made, which may take long: of what has been read
     if (r->halt.first && o->dir && !m->kept) r->digests = bt_case_digests(c);
     bt_status status = set_up(r, m->kept, err);
@@ -425,8 +444,12 @@ static bt_status finish(run *r, bt_errors *err)
 {
     char stopped[96] = "";
     bt_snapshot s = {0};
+    const double t0 = bt_clock();
     bt_status status = bt_running_save(r, &s, BT_CHECKPOINT_FILE, err); // before what is still open is closed
-    r->totals.wall_time += bt_clock() - r->began;
+    clock_part(r, &r->totals.call.steps);
+    r->totals.phases.output += r->clocked - t0;
+    r->totals.wall_time += r->clocked - r->began;
+    r->totals.stepped = r->clocked;
     total_up(r);
     if (status == BT_OK) status = look_last(r, err);
     if (ends_early(r)) {

@@ -25,6 +25,7 @@ void bt_pair_scratch_free(bt_pair_scratch *s)
     free(s->box);
     free(s->body);
     free(s->found);
+    free(s->name);
     free(s->shore.found);
     *s = (bt_pair_scratch){0};
 }
@@ -295,34 +296,30 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
     return n;
 }
 
-static int by_gids(const void *p, const void *q, void *gids)
+static bt_named name_of(const bt_gid *gid, const bt_pair *p, size_t at)
 {
-    const bt_pair *a = p, *b = q;
-    const bt_gid *gid = gids;
-    if (a->a != b->a) return gid[a->a] < gid[b->a] ? -1 : 1;
-    if (a->b != b->b) return gid[a->b] < gid[b->b] ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    return a->part[1] < b->part[1] ? -1 : a->part[1] > b->part[1];
+    return (bt_named){gid[p->a], gid[p->b], (uint32_t)p->part[0] << 16 | p->part[1], (uint32_t)at};
 }
 
 /// What the old list knew of the pairs that stay: both lists are sorted, one walk matches them.
 static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
 {
-    bt_gid *gid = w->bodies.gid;
-    if (n > 0) qsort_r(s->found, n, sizeof *s->found, by_gids, gid);
+    const bt_gid *gid = w->bodies.gid;
+    bt_pair_search *of = &t->search;
+    if (n > s->cap_names) s->name = bt_realloc(s->name, 2 * (s->cap_names = 2 * n), sizeof *s->name);
+    for (size_t i = 0; i < n; i++) s->name[i] = name_of(gid, &s->found[i], i);
+    bt_named_sort(s->name, s->name + s->cap_names, n);
+    bt_pair *list = bt_realloc(NULL, n, sizeof *list);
     bt_idx k = 0;
     for (size_t i = 0; i < n; i++) {
-        while (k < t->search.n_pairs && by_gids(&t->search.pairs[k], &s->found[i], gid) < 0) k++;
-        if (k < t->search.n_pairs && by_gids(&t->search.pairs[k], &s->found[i], gid) == 0)
-            s->found[i] = t->search.pairs[k];
+        bt_named old = {0};
+        while (k < of->n_pairs && (old = name_of(gid, &of->pairs[k], 0), bt_named_before(&old, &s->name[i]))) k++;
+        const bool stays = k < of->n_pairs && !bt_named_before(&s->name[i], &old);
+        list[i] = stays ? of->pairs[k] : s->found[s->name[i].at];
     }
-    if (n > (size_t)t->search.cap_pairs) {
-        t->search.cap_pairs = bt_cells_room((bt_idx)n);
-        free(t->search.pairs);
-        t->search.pairs = bt_realloc(NULL, (size_t)t->search.cap_pairs, sizeof *t->search.pairs);
-    }
-    if (n > 0) memcpy(t->search.pairs, s->found, n * sizeof *t->search.pairs);
-    t->search.n_pairs = (bt_idx)n;
+    free(of->pairs);
+    of->pairs = list;
+    of->n_pairs = of->cap_pairs = (bt_idx)n;
 }
 
 /// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.

@@ -3,6 +3,7 @@
 #ifndef BERGTOW_PAIRS_H
 #define BERGTOW_PAIRS_H
 
+#include "base/named.h"
 #include "space/cells.h"
 #include "space/shore.h"
 
@@ -13,6 +14,8 @@ typedef struct bt_pair_scratch {
     size_t cap_boxes;
     bt_pair *found;       ///< [cap_found]
     size_t cap_found;
+    bt_named *name;       ///< [2][cap_names] of those found
+    size_t cap_names;
     bt_shore_list shore;  ///< polygons near a body
 } bt_pair_scratch;
 

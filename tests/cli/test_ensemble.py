@@ -42,6 +42,27 @@ def quiet(tmp_path_factory):
     return folder, result
 
 
+def test_conditions_with_common_fields_make_them_once(tmp_path):
+    """Members that another condition shares its ice with take it from there, stopped or not, and have the results they
+    have alone; the fields are gone once all is done."""
+    study = {"title": "s", "base": "base.yml", "repeats": 2, "seed": 4, "fields": "common",
+             "parameters": {"tow.speed": ["0.1 m/s", "0.2 m/s"], "ice.friction": [0.2, 0.3]}}
+    prepare(tmp_path, study)
+    assert ensemble(tmp_path, "all", "--steps", 1).returncode == SIGNAL
+    kept = sorted(p.name for p in (tmp_path / "all/fields").iterdir())
+    assert len(kept) == 2
+    assert ensemble(tmp_path).returncode == DONE and not (tmp_path / "all/fields").exists()
+    for member in "c001-r002", "c004-r002":
+        folder = tmp_path / "all/members" / member
+        alone = call("run", folder / "case.resolved.yml", "-o", tmp_path / member)
+        assert alone.returncode == DONE, alone.stderr
+        hashes = [json.loads((at / "summary.json").read_text())["state_hash"] for at in (folder, tmp_path / member)]
+        assert hashes[0] == hashes[1]
+    del study["fields"] # each condition has its own: nothing is kept
+    (tmp_path / "study.yml").write_text(json.dumps(study))
+    assert ensemble(tmp_path, "own", "--steps", 1).returncode == SIGNAL and not (tmp_path / "own/fields").exists()
+
+
 def test_a_study_names_its_members(quiet, tmp_path):
     """The base's title is that of one condition. What the study sets is kept, and a study without a title says no more
     than the base."""

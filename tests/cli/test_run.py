@@ -25,6 +25,7 @@ NUMBERS = (
     "contacts_mean ns_per_floe_step momentum_residual").split()
 WHOLE = "n_floes n_steps ranks threads unconverged_steps".split()
 PHASES = "detect colour forces solve advance exchange output project".split()
+CALL = "program ice world record steps end".split()
 SERIES = "time tow_force ice_resistance drag_force body_x body_y body_yaw contacts sweeps residual".split()
 
 
@@ -48,12 +49,22 @@ def test_summary_tells_the_truth(finished):
     s = finished.summary
     assert (s["n_steps"], s["dt_s"], s["ranks"], s["threads"]) == (300, 0.1, 1, 1)
     assert s["sim_time_s"] == pytest.approx(30) and s["n_floes"] == len(finished.dataset("/floes/area"))
-    assert 0 < sum(s["phases_s"].values()) <= s["wall_time_s"] * 1.001
+    assert 0.9 * s["wall_time_s"] <= sum(s["phases_s"].values()) <= s["wall_time_s"] * 1.001 # no second is unnamed
+    assert list(s["call_s"]) == CALL and all(v > 0 for v in s["call_s"].values())
+    assert s["call_s"]["steps"] == pytest.approx(s["wall_time_s"], rel=1e-9) # all in one call
     assert s["ns_per_floe_step"] == pytest.approx(s["wall_time_s"] * 1e9 / 300 / s["n_floes"], rel=1e-9)
     overlap, sweeps, contacts = finished.series("overlap", "sweeps", "contacts")
     assert s["max_overlap_m"] >= overlap.max() > 0 # and of the last state: test_guards.py
     assert s["mean_sweeps"] == pytest.approx(sweeps.mean()) and s["contacts_mean"] == pytest.approx(contacts.mean())
     assert 0 < s["mean_ice_resistance_se_n"] < s["mean_ice_resistance_n"] < s["mean_tow_force_n"]
+
+
+def test_the_parts_of_a_call_are_all_of_it(tmp_path):
+    """From the start of the process to the summary: but for the table, and for what a busy machine takes."""
+    begin = time.monotonic()
+    s = run(tmp_path, changed(TOW, run__duration=80, output=None)).summary
+    whole = time.monotonic() - begin
+    assert 0.75 * whole < sum(s["call_s"].values()) < whole + 0.02
 
 
 def test_series_and_frames(finished):

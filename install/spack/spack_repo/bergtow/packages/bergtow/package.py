@@ -28,6 +28,7 @@ class Bergtow(MakefilePackage):
     depends_on("jansson")
     depends_on("random123")
     depends_on("xxhash@0.8:")
+    depends_on("zlib-api")
     for package in ("numpy", "h5py", "matplotlib", "jinja2", "pyyaml", "scipy"):
         depends_on(f"py-{package}", type="run")
 

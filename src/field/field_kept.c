@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+// Fields kept for other runs; reasons in field_kept.h.
+//
+//     head: magic, digest of all that follows, digest of the name, numbers of the field
+//     offsets [n+1], vertices [V][2], pose [n][3], thickness [n], area [n] as in bt_field
+#include "field/field_kept.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fileio.h"
+#include "base/largest.h"
+#include "bergtow/shape.h"
+#include "base/provenance.h"
+#include "case/case_files.h"
+#include "case/value.h"
+
+#define MAGIC "bergtow kept field\n"
+
+/// Keys of these sections on which no ice that is made or read depends.
+static const char *const idle[] = {
+    "ice.added_mass", "ice.added_inertia", "ice.crushing.", "ice.density", "ice.drag.", "ice.friction", "ice.rafting.",
+    "ice.restitution", "ice.start", "domain.wall_", "body.added_", "body.density", "body.draft", "body.drag.",
+    "body.friction", "body.mass", "body.restitution", "body.sail", "body.vx", "body.vy", "body.yaw_rate"};
+static const char *const sections[] = {"ice.", "domain.", "body."};
+
+static bool begins(const char *name, const char *const *with, size_t n)
+{
+    for (size_t k = 0; k < n; k++)
+        if (!strncmp(name, with[k], strlen(with[k]))) return true;
+    return false;
+}
+
+#define BEGINS(name, with) begins(name, with, sizeof with / sizeof *with)
+
+static void write_keys(FILE *out, const bt_key *keys, int n, const void *base)
+{
+    for (int k = 0; k < n; k++) {
+        fprintf(out, "%s: ", keys[k].name);
+        bt_value_write(&keys[k], base, out);
+        fputc('\n', out);
+    }
+}
+
+void bt_field_digest(const bt_case *c, char digest[BT_CHECKSUM_DIGEST])
+{
+    bt_text t;
+    bt_text_begin(&t);
+    fprintf(t.out, "bergtow %s %s\n", BT_VERSION, bt_provenance_revision());
+    for (int k = 0; k < bt_n_case_keys - bt_schema_added(); k++) {
+        const bt_key *key = &bt_case_keys[k];
+        if (!BEGINS(key->name, sections) || BEGINS(key->name, idle)) continue;
+        write_keys(t.out, key, 1, c);
+        const char *path = bt_case_file(c, key);
+        bt_errors unheard = {0}; // who reads it says so
+        int64_t bytes;
+        if (path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK) fprintf(t.out, "%s\n", digest);
+        bt_errors_free(&unheard);
+    }
+    for (bt_idx i = 0; i < c->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
+    double v[2 * BT_MAX_VERTICES]; // a shape that a program adds is known by its name alone
+    const int n = bt_case_waterline(c, v);
+    for (int k = 0; k < 2 * n; k++) fprintf(t.out, "%a\n", v[k]);
+    char *text = bt_text_end(&t);
+    bt_checksum_digest_text(text, strlen(text), digest);
+    free(text);
+}
+
+typedef struct head {
+    char magic[32], digest[BT_CHECKSUM_DIGEST], name[BT_CHECKSUM_DIGEST];
+    int64_t n, n_vertices;
+    double ice_area, concentration, strip;
+    char frame[16];
+    bt_outline_counts outlines;
+} head;
+
+enum { ARRAYS = 5 };
+static const size_t sealed = offsetof(head, name); ///< from here on the digest is of
+
+typedef struct piece { void *at; size_t bytes; } piece;
+
+static void pieces_of(bt_field *f, int64_t n, int64_t n_vertices, piece p[ARRAYS])
+{
+    const size_t row = (size_t)n * sizeof(double);
+    const piece all[ARRAYS] = {{f->offsets, row + sizeof *f->offsets},
+                               {f->vertices, 2 * (size_t)n_vertices * sizeof *f->vertices},
+                               {f->pose, 3 * row}, {f->thickness, row}, {f->area, row}};
+    memcpy(p, all, sizeof all);
+}
+
+/// The bytes of a file; the caller frees them.
+static char *packed(bt_field *f, const char *name, size_t *size)
+{
+    piece p[ARRAYS];
+    pieces_of(f, f->n, f->offsets[f->n], p);
+    *size = sizeof(head);
+    for (int k = 0; k < ARRAYS; k++) *size += p[k].bytes;
+    char *bytes = bt_alloc(*size, 1), *to = bytes + sizeof(head);
+    memset(bytes, 0, sizeof(head)); // and what lies between its members
+    head *h = (head *)bytes;
+    memcpy(h->magic, MAGIC, sizeof MAGIC);
+    memcpy(h->name, name, sizeof h->name);
+    h->n = f->n, h->n_vertices = f->offsets[f->n];
+    h->ice_area = f->ice_area, h->concentration = f->concentration, h->strip = f->strip;
+    memcpy(h->frame, f->frame, sizeof h->frame);
+    h->outlines = f->outlines;
+    for (int k = 0; k < ARRAYS; to += p[k++].bytes)
+        if (p[k].bytes > 0) memcpy(to, p[k].at, p[k].bytes);
+    bt_checksum_digest_text(bytes + sealed, *size - sealed, h->digest);
+    return bytes;
+}
+
+/// The field of a file's bytes; false: they are not those of a whole file of this name.
+static bool unpacked(bt_field *f, const char *name, const char *bytes, size_t size)
+{
+    head h;
+    char digest[BT_CHECKSUM_DIGEST];
+    if (size < sizeof h) return false;
+    memcpy(&h, bytes, sizeof h);
+    bt_checksum_digest_text(bytes + sealed, size - sealed, digest);
+    if (memcmp(h.magic, MAGIC, sizeof MAGIC) || memcmp(h.digest, digest, sizeof digest) ||
+        memcmp(h.name, name, sizeof h.name) || h.n < 0 || h.n > BT_MOST_FLOES || h.n_vertices < 0 ||
+        h.n_vertices > BT_MOST_FLOES * (int64_t)BT_MAX_VERTICES)
+        return false;
+    f->n = f->cap = (bt_idx)h.n, f->cap_vertices = h.n_vertices;
+    f->ice_area = h.ice_area, f->concentration = h.concentration, f->strip = h.strip;
+    memcpy(f->frame, h.frame, sizeof f->frame);
+    f->outlines = h.outlines;
+    f->offsets = bt_realloc(f->offsets, (size_t)h.n + 1, sizeof *f->offsets);
+    f->vertices = bt_alloc(2 * (size_t)h.n_vertices, sizeof *f->vertices);
+    f->pose = bt_alloc(3 * (size_t)h.n, sizeof *f->pose);
+    f->thickness = bt_alloc((size_t)h.n, sizeof *f->thickness);
+    f->area = bt_alloc((size_t)h.n, sizeof *f->area);
+    piece p[ARRAYS];
+    pieces_of(f, h.n, h.n_vertices, p);
+    const char *from = bytes + sizeof h;
+    for (int k = 0; k < ARRAYS; from += p[k++].bytes)
+        if (p[k].bytes > 0) memcpy(p[k].at, from, p[k].bytes);
+    return true;
+}
+
+static bool take(const char *path, const char *name, bt_field *f)
+{
+    if (access(path, F_OK) != 0) return false;
+    char *bytes = NULL;
+    size_t size;
+    bt_errors why = {0};
+    const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, &why) == BT_OK &&
+                       unpacked(f, name, bytes, size);
+    free(bytes);
+    bt_errors_free(&why);
+    if (whole) return true;
+    bt_errors_add(&why, "warning: %s: is damaged, or no field of this program; it is made anew", path);
+    bt_errors_print(&why);
+    bt_errors_free(&why);
+    return false;
+}
+
+/// By way of a name of this process; not brought to the disk, for a file that is not whole is made anew.
+static void keep(const char *path, const char *name, bt_field *f)
+{
+    size_t size;
+    char *bytes = packed(f, name, &size), *part = bt_text_of("%s.%ld.part", path, (long)getpid());
+    const int fd = bt_file_descriptor(part, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW);
+    const bool written = fd >= 0 && bt_file_put(fd, 0, bytes, size) == 0;
+    if (fd >= 0 && (bt_file_close(fd) != 0 || !written || rename(part, path) != 0)) unlink(part);
+    free(part);
+    free(bytes);
+}
+
+bt_status bt_field_load_kept(const char *dir, const bt_case *c, bt_field *f, bt_errors *err)
+{
+    if (!dir) return bt_field_load(c, f, err);
+    char name[BT_CHECKSUM_DIGEST];
+    bt_field_digest(c, name); // before the files of the ice are read: what is read later has another name
+    char *path = bt_text_of("%s/%s", dir, name);
+    bt_errors unheard = {0};
+    const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;
+    bt_errors_free(&unheard);
+    bt_status status = BT_OK;
+    if (!room || !take(path, name, f)) {
+        status = bt_field_load(c, f, err);
+        if (status == BT_OK && room) keep(path, name, f);
+    }
+    free(path);
+    return status;
+}
+
+void bt_field_forget_kept(const char *dir)
+{
+    DIR *d = opendir(dir);
+    for (const struct dirent *entry; d && (entry = readdir(d));) {
+        const char *name = entry->d_name;
+        const size_t digits = strspn(name, "0123456789abcdef");
+        if (digits != BT_CHECKSUM_DIGEST - 1 || (name[digits] && name[digits] != '.')) continue;
+        char *path = bt_file_join(dir, name);
+        unlink(path);
+        free(path);
+    }
+    if (d) closedir(d);
+    rmdir(dir);
+}
