@@ -138,7 +138,10 @@ static bool is_touched(const bt_cells *t, bt_idx k)
     const bt_cell *cell = &t->cell[k];
     const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
     bool any = cell->phase == BT_COLOURS;
-    for (int j = 0; j < 4 && !any; j++) any = block[j] >= 0 && t->cell[block[j]].work.swept;
+    for (int j = 0; j < 4 && !any; j++) { // a cell without bodies may be there on some ranks only
+        const bt_cell *o = block[j] >= 0 ? &t->cell[block[j]] : NULL;
+        any = o && o->end > o->first && o->work.swept;
+    }
     return any;
 }
 

@@ -34,8 +34,8 @@ JAM = {
     "body": {"shape": "none"},
     "solver": {"tile": 2.5, "max_sweeps": 15},
     "output": {"frame_interval": 2.5},
-    # a jam that no one would run on: overlap beyond a floe, floes through the walls
-    "guard": {"overlap": 0, "escape": False},
+    # a jam that no one would run on: overlap beyond a floe, floes through the walls, no solution in the end
+    "guard": {"overlap": 0, "escape": False, "no_solution": 0, "energy": 0},
 }
 # No walls, every force, and floes of very different size; the current, which the tide turns, carries them through tiles
 # and seams.
