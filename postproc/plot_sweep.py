@@ -47,7 +47,7 @@ def spread(x, n, half, log):
 MARKS = {
     "sound": ({"marker": "o", "markersize": 3.6, "markeredgewidth": 0, "color": style.ICE, "alpha": 0.35}, "{}"),
     "doubtful": ({"marker": "o", "markersize": 4.2, "markeredgewidth": 0.9, "color": style.ICE, "alpha": 0.6,
-                  "markerfacecolor": "none"}, "{} in doubt: not steady, too short, little ice, unconverged or stopped"),
+                  "markerfacecolor": "none"}, "{} in doubt (ensemble.py: doubts)"),
     "jammed": ({"marker": "x", "markersize": 5, "markeredgewidth": 1.2, "color": style.JAM},
                "{} where the body stood still"),
 }

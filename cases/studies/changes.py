@@ -139,7 +139,7 @@ def draw(studies, of):
     for (name, _), r, (colour, dashes), dx in zip(studies, of, LINES, shift):
         look = {"color": colour, "linestyle": "" if texts else dashes, "marker": "o", "markersize": 3.5,
                 "linewidth": 1.4, "capsize": 2}
-        r = r[order]
+        r = np.where(np.isfinite(r[order, 1:2]), r[order], np.nan)  # one field has no interval
         above.errorbar(x[order] + dx, r[:, 0] / factor, r[:, 4] / factor, label=name, **look)
         if name != studies[0][0]:
             below.errorbar(x[order] + dx, r[:, 2], r[:, 3], **look)
@@ -153,7 +153,7 @@ def draw(studies, of):
     if texts:
         below.set_xticks(x, texts, rotation=30, ha="right", fontsize=8)
         figure.subplots_adjust(bottom=0.22)
-    style.head(figure, base.title, f"the same fields with one value changed; against \"{studies[0][0]}\"; bars: 95 %")
+    style.head(figure, base.title, f"the same fields; changes against \"{studies[0][0]}\"; bars: 95 %")
     return figure
 
 
