@@ -79,7 +79,7 @@ typedef enum { BT_KEEP, BT_PUT_BACK, BT_FORGET } bt_keeping;
 
 /// What is iterated.
 typedef struct bt_problem {
-    bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list) and say what it found (bt_rounds_found); context: this
+    bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list), tell what is left (_found); context: this
     bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
     bt_visit *keep;       ///< keep the unknowns of a cell, put them back, or forget them; context: bt_keeping. Or NULL
     void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL

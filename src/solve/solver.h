@@ -33,10 +33,10 @@
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
 // which is zero exactly at a solution. The largest change of a row's speed in a sweep is the same quantity seen while
-// velocities still change; it only says when the true map is worth its price. Its root mean square over all rows is reported
-// beside it. Under a bound the map is bounded, too, by L W: an impulse that is short of it by more than 1 % counts by
-// the speed that it leaves (bt_short_residual in src/solve/kernel.h); of sheets, whose impulse has a direction, one that
-// takes 1 % less power than the bound allows.
+// velocities still change; it only says when the true map is worth its price. Its root mean square over all rows is
+// reported beside it. Under a bound the map is bounded, too, by L W: an impulse that is short of it by more than 1 %
+// counts by the speed that it leaves (bt_short_residual in src/solve/kernel.h); of sheets, whose impulse has a
+// direction, one that takes 1 % less power than the bound allows.
 #ifndef BERGTOW_SOLVER_H
 #define BERGTOW_SOLVER_H
 
