@@ -444,20 +444,20 @@ static void damage_is_refused(void **state)
         strstr(err.text[0],
                "has the format \"checkpoint 1\", this program reads \"checkpoint 4\"; use the program that wrote it"));
     bt_errors_free(&err);
-    // Two files of one length, the front of one on the back of the other.
+    // Two files, the front of one on the back of the other.
     bt_world_step(w);
     bt_snapshot later = {0};
     save(&t, w, &later);
     must(write_snapshot(&later, path, bt_checkpoint_meaning, &err), &err);
     size_t m;
     char *other = slurp(path, &m);
-    assert_int_equal(m, n);
-    size_t last = n - BT_CHECKSUM_BYTES - 1;
+    const size_t both = (m < n ? m : n) - BT_CHECKSUM_BYTES;
+    size_t last = both - 1;
     while (other[last] == bytes[last]) last--;
     memcpy(other, bytes, last); // the last byte in which they differ stays
     spill(path, other, m);
     refused(path, m);
-    memcpy(other, bytes, n - BT_CHECKSUM_BYTES); // under the seal of the other
+    memcpy(other, bytes, both); // under the seal of the other
     spill(path, other, m);
     refused(path, m);
     free(other);
