@@ -100,7 +100,7 @@ static char *packed(bt_field *f, const char *name, size_t *size)
     *size = sizeof(head);
     for (int k = 0; k < ARRAYS; k++) *size += p[k].bytes;
     char *bytes = bt_alloc(*size, 1), *to = bytes + sizeof(head);
-    memset(bytes, 0, sizeof(head)); // and what lies between its members
+    memset(bytes, 0, sizeof(head)); // padding, too: the digest covers it
     head *h = (head *)bytes;
     memcpy(h->magic, MAGIC, sizeof MAGIC);
     memcpy(h->name, name, sizeof h->name);
@@ -176,7 +176,7 @@ bt_status bt_field_load_kept(const char *dir, const bt_case *c, bt_field *f, bt_
 {
     if (!dir) return bt_field_load(c, f, err);
     char name[BT_CHECKSUM_DIGEST];
-    bt_field_digest(c, name); // before the files of the ice are read: what is read later has another name
+    bt_field_digest(c, name); // first: a file of the ice that changes later then gives another digest
     char *path = bt_text_of("%s/%s", dir, name);
     bt_errors unheard = {0};
     const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;

@@ -109,10 +109,10 @@ static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const 
 /// Residual of a row under a bound that is `part` of its impulse short of what its map says, m/s, `closing`: the speed
 /// that it leaves. The natural map is at most bound × W there, whatever the speed. Where that is below the tolerance
 /// (a short step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position
-/// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts. Of sheets the way to
-/// the map is the way along the rim, too: the direction of a small disc turns with the last digits of the slip, which
-/// cost a third of all sweeps at 90 % ice. So `part` is no more than the part of the power R |w| that the impulse does
-/// not take.
+/// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts. The impulse of
+/// sheets has a direction, too, which on a small disc turns with the last digits of the slip: to ask for it to 1 % took
+/// 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power R |w| that
+/// the impulse does not take.
 static inline double bt_short_residual(double closing, double part, double tolerance)
 {
     return bt_min(closing, part * (tolerance / BT_SHORT));
