@@ -82,12 +82,14 @@ typedef struct bt_rise {
 
 /// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
-    double flat[2];  ///< the bound at any approach; flat[0] of sheets: the radius of their disc, N s
+    double flat[2];  ///< the bound at any approach; flat[0] of sheets: most that their friction bears, N s
     double most[2];  ///< N s
-    double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
     union {
-        double place[2];  ///< approach that closes the gap, and nothing gives way, m/s
-        double centre[2]; ///< of sheets: where the middle of their disc is, along x and y, N s
+        struct {
+            double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
+            double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
+        };
+        double loss[2][2]; ///< of sheets: e_1 and e_2 of contact/raft.h along x and y, N s
     };
     double grown[2]; ///< by how much the bodies go into each other in this step, m
     bt_rise *rise;   ///< NULL where no law has a rising bound

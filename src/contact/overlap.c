@@ -94,7 +94,7 @@ static double inside_of(const double *q, int n, double x, double y, const double
     return least;
 }
 
-void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], const bt_overlap *o,
+void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *o,
                          double blend, double grad[2], double *turn)
 {
     const bt_bodies *s = &w->bodies;
@@ -105,6 +105,7 @@ void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t p
     for (int k = 0; k < o->n; k++) {
         const double *p = v + 2 * k, *q = v + 2 * (k + 1 < o->n ? k + 1 : 0);
         const double ex = q[0] - p[0], ey = q[1] - p[1], length = sqrt(ex * ex + ey * ey);
+        o->push[k][0] = o->push[k][1] = 0;
         if (!(length > 0)) continue;
         const double middle[2] = {0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])}, nx = ey / length, ny = -ex / length;
         const bool of_b = o->of_b[o->now][k];
@@ -112,6 +113,7 @@ void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t p
             of_b ? inside_of(outline_of(s, a, part[0]), count_of(s, a, part[0]), 0, 0, middle, nx, ny)
                  : inside_of(outline_of(s, b, part[1]), count_of(s, b, part[1]), off[0], off[1], middle, nx, ny);
         const double weight = (of_b ? 0.5 : -0.5) * bt_min(1, depth / blend);
+        o->push[k][0] = -weight * ey, o->push[k][1] = weight * ex;
         grad[0] += weight * ey;
         grad[1] -= weight * ex;
         *turn += weight * (-middle[0] * ex - middle[1] * ey);

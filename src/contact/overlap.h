@@ -11,6 +11,7 @@ typedef struct bt_overlap {
     double v[2][4 * BT_MAX_VERTICES];  ///< v[now]: the vertices, m
     uint8_t of_b[2][2 * BT_MAX_VERTICES]; ///< 1 = the edge that starts at the vertex is one of b
     int now;
+    double push[2 * BT_MAX_VERTICES][2]; ///< what each edge has of −grad, m: by bt_overlap_gradient
 } bt_overlap;
 
 /// Intersection of these parts of a and b when b has been moved by (dx, dy): Sutherland & Hodgman 1974, Comm. ACM 17, a
@@ -27,7 +28,7 @@ double bt_overlap_area(const bt_overlap *o, double centroid[2]);
 ///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl,   turn = ½ (∫_b − ∫_a) r × n dl
 /// Where edges of both lie on each other and face the same way (rectangles in a row) the gradient jumps as one passes
 /// the other. Such edges count for neither; within `blend` of each other in part.
-void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], const bt_overlap *o,
+void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *o,
                          double blend, double grad[2], double *turn);
 
 #endif

@@ -3,6 +3,7 @@
 #include "contact/raft.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "contact/overlap.h"
 #include "contact/row.h"
@@ -157,7 +158,21 @@ static void edge_of(const double grad[2], double turn, double length, double gap
                   side < 0 ? 0xfff00000u : 0xfff00001u);
 }
 
-/// False without an edge; `sheets` always.
+/// p and s of raft.h: of a push that goes along the edge by less than the blend, e_1 and e_2 both have a part.
+static void split(const bt_overlap *o, const bt_manifold *edge, double length, double blend, double *p, double *s)
+{
+    const double nx = edge->nx, ny = edge->ny;
+    double n = 0, t = 0;
+    for (int k = 0; k < o->n; k++) {
+        const double along = o->push[k][1] * nx - o->push[k][0] * ny;
+        const double part = bt_max(0, bt_min(1, 0.5 * (1 + along / blend)));
+        n += part * (o->push[k][0] * nx + o->push[k][1] * ny);
+        t += part * along;
+    }
+    *p = bt_max(0, bt_min(1, n / length)), *s = bt_min(0.5, t / length);
+}
+
+/// False without an edge; `sheets` always: with p and s in place of a normal.
 static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
 {
     bt_overlap o;
@@ -168,11 +183,12 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     bt_overlap_gradient(w, p->a, p->b, p->part, &o, least_blend(w), grad, &turn);
     bt_bodies_offset(w, p->a, p->b, off);
     *edge = (bt_manifold){.a = p->a, .b = p->b};
-    *sheets = (bt_manifold){.a = p->a, .b = p->b, .nx = 1};
+    *sheets = (bt_manifold){.a = p->a, .b = p->b};
     sheets->p[0] = (bt_point){.ra = {centroid[0], centroid[1]}, .rb = {centroid[0] - off[0], centroid[1] - off[1]}};
     const double length = bt_hypot(grad[0], grad[1]);
     if (!(length > LEAST_LENGTH * thinner(&w->bodies, p->a, p->b))) return false;
     edge_of(grad, turn, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
+    split(&o, edge, length, least_blend(w), &sheets->nx, &sheets->ny);
     return true;
 }
 
@@ -204,35 +220,38 @@ static double reached(const bt_world *w, const bt_contact *edge, double gap)
     return bt_max(0, 1 - gap / (way + least_blend(w)));
 }
 
-/// Leaves an edge the stored part of its bound. Returns the rest, R of raft.h, N s.
-static double take_losses(const bt_world *w, bt_cell *t, bt_idx edge)
+/// Leaves an edge the stored part of its bound, and makes e_1 and e_2 of the rest.
+static void take_losses(const bt_world *w, bt_cell *t, bt_idx edge, double p, double s, double e[2][2])
 {
     const bt_contact *u = &t->contacts[edge];
     bt_limit *l = &t->laws.limits[edge];
     const double length = bt_max(2 * fabs(u->ran[1] - u->ran[0]), thinner(&w->bodies, u->a, u->b));
     const double part = 0.5 * stored_load(w, u->a, u->b) * length * w->par.dt;
-    double losses = 0;
+    double all = 0, rest = 0;
     for (int i = 0; i < u->n; i++) {
-        losses += bt_max(0, l->flat[i] - part);
+        all += l->flat[i], rest += bt_max(0, l->flat[i] - part);
         l->flat[i] = bt_min(l->flat[i], part);
         l->most[i] = bt_min(l->most[i], part);
         l->cap[i] = bt_min(l->cap[i], part);
     }
-    return losses * reached(w, u, t->gaps[edge].gap[0]);
+    const double due = reached(w, u, t->gaps[edge].gap[0]), aside = due * all * s;
+    for (int c = 0; c < 2; c++) {
+        const double n = due * rest * (c ? u->ny : u->nx), along = aside * (c ? u->nx : -u->ny);
+        e[0][c] = p * n + along;
+        e[1][c] = (1 - p) * n - along;
+    }
 }
 
 /// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
-static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, const bt_memory *r)
+static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, const bt_manifold *m,
+                         const bt_memory *r)
 {
     bt_contact *u = &t->contacts[j];
     bt_limit *l = &t->laws.limits[j];
     const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
     l->flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
-    if (edge >= 0) {
-        const double half = 0.5 * take_losses(w, t, edge);
-        l->flat[0] += half;
-        l->centre[0] = half * t->contacts[edge].nx, l->centre[1] = half * t->contacts[edge].ny;
-    }
+    memset(l->loss, 0, sizeof l->loss);
+    if (edge >= 0) take_losses(w, t, edge, m->nx, m->ny, l->loss);
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
@@ -243,7 +262,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     const bt_idx at = bt_law_find(t, &names);
     l->record[BT_LAW_RAFTING] = (int32_t)at;
     if (m->n_points == 0) {
-        bound_sheets(w, t, j, p->contact, &t->laws.memory[at]);
+        bound_sheets(w, t, j, p->contact, m, &t->laws.memory[at]);
         return;
     }
     if (at >= 0) t->contacts[j].mu = 0; // what acts along the edge is in the contact of the sheets
@@ -263,7 +282,8 @@ double bt_raft_pressing(const bt_cell *t, bt_idx j)
     const bt_idx edge = t->search.pairs[u->pair].contact;
     if (edge < 0) return 0;
     const bt_contact *e = &t->contacts[edge];
-    const double *c = t->laws.limits[j].centre, most = 2 * bt_hypot(c[0], c[1]);
+    const bt_limit *l = &t->laws.limits[j];
+    const double most = bt_hypot(l->loss[0][0] + l->loss[1][0], l->loss[0][1] + l->loss[1][1]);
     return e->ln[0] + e->ln[1] + bt_max(0, bt_min(most, u->ln[0] * e->nx + u->lt * e->ny));
 }
 
@@ -283,9 +303,10 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 static double losses_of(const bt_world *w, const bt_contact *u, const bt_limit *l)
 {
     const bt_vel *a = &w->bodies.vel[u->a], *b = &w->bodies.vel[u->b];
-    const double x = bt_normal_velocity(u, 0, a, b), y = bt_tangent_velocity(u, a, b), speed = bt_hypot(x, y);
-    const double *c = l->centre, half = bt_hypot(c[0], c[1]), all = l->flat[0] * speed - c[0] * x - c[1] * y;
-    return all > 0 ? bt_max(0, 1 - (l->flat[0] - half) * speed / all) : 0;
+    const double x = bt_normal_velocity(u, 0, a, b), y = bt_tangent_velocity(u, a, b);
+    double lost = 0;
+    for (int k = 0; k < 2; k++) lost += bt_max(0, -(l->loss[k][0] * x + l->loss[k][1] * y));
+    return lost > 0 ? lost / (lost + l->flat[0] * bt_hypot(x, y)) : 0;
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.

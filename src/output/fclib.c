@@ -8,9 +8,10 @@
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /solution/{u, r}
-//     /bound, /disc, /centre, /places              of our own: bounds of the normal impulses; radius (NaN = another
-//                                                  contact) and middle of the disc that both components of a contact
-//                                                  lie in (mu is 0); where contacts and bodies are
+//     /bound, /disc, /loss, /places                of our own: bounds of the normal impulses; radius (NaN = another
+//                                                  contact) of the disc, and sides of the parallelogram, of whose
+//                                                  points both components of a contact are the sum (mu is 0); where
+//                                                  contacts and bodies are
 #include "bergtow/fclib.h"
 
 #include <errno.h>
@@ -122,8 +123,11 @@ static void write_more(bt_h5 *h, const bt_fclib_problem *p)
         put(h, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
     if (p->disc)
         put(h, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
-            "radius of the disc that both impulses lie in; NaN: another contact");
-    if (p->centre) put_rows(h, "/centre", 2 * p->n, p->centre, "N s", "the middle of that disc; 0 of other contacts");
+            "both impulses are the sum of a point of the disc of this radius and one of the parallelogram of `loss`; "
+            "NaN: another contact");
+    if (p->loss)
+        put(h, "/loss", H5T_NATIVE_DOUBLE, n, 4, p->loss, "contact side_xy", "N s",
+            "both sides, from 0, of the parallelogram; 0 of other contacts");
     if (p->places) write_places(h, p->places, n);
     if (!p->r) return;
     bt_h5_group(h, "/solution");

@@ -26,11 +26,13 @@ typedef struct bt_batch {
 } bt_batch;
 _Static_assert(sizeof(bt_batch) == 32 * sizeof(bt_vec), "the listed contacts of dense ice, 256 bytes each");
 
-/// The middle of the disc of sheets, which have one point and so neither of the two.
-#define BT_CENTRE_X w12
-#define BT_CENTRE_Y per_det
+/// e_1 and e_2 of sheets (contact/raft.h), which have one point and so none of these.
+#define BT_LOSS_1_X w12
+#define BT_LOSS_1_Y per_det
+#define BT_LOSS_2_X w[1]
+#define BT_LOSS_2_Y mn[1]
 
-/// Of the normals; [0] of sheets: the radius of their disc. After the batches of a cell whose contacts have bounds.
+/// Of the normals; [0] of sheets: of their friction. After the batches of a cell whose contacts have bounds.
 typedef struct bt_batch_bounds {
     bt_vec of[2];
 } bt_batch_bounds;

@@ -75,7 +75,7 @@ static void start_impulses(bt_cell *cell, const bt_inv *inv)
         bt_contact *u = &cell->contacts[i];
         for (int j = 0; cell->laws.limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);
         if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
-        else bt_onto_disc(&cell->laws.limits[i], &u->ln[0], &u->lt);
+        else bt_onto_sheets(&cell->laws.limits[i], &u->ln[0], &u->lt);
         if (!in_place) continue;
         double *x = cell->work.in_place[i].before;
         x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;

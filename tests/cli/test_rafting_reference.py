@@ -3,7 +3,7 @@
 
     u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound
     |r_t| <= μ r_n against u_t
-    sheets on each other: (r_x, r_y) = c + d, |d| <= R, d against (u_x, u_y)
+    sheets on each other: (r_x, r_y) = α e_1 + β e_2 + d, 0 <= α, β <= 1, |d| <= R, the largest power against (u_x, u_y)
 
 For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of
 such problems. Floes that have rafted have no friction bound: without walls a problem of them alone is convex as it
@@ -29,11 +29,19 @@ CLUSTER = {
 
 
 class Rafting(Problem):
+    """z: impulses r, but that of sheets only by their disc, and then what they have along their sides."""
+
     def __init__(self, path):
         super().__init__(path)
         with h5py.File(path) as f:
-            self.disc, self.centre = f["disc"][:], f["centre"][:]
+            self.disc, loss = f["disc"][:], f["loss"][:].reshape(-1, 2, 2)
         self.sheets = np.isfinite(self.disc)
+        size = np.hypot(*np.moveaxis(loss, -1, 0))
+        self.side = [(k, i) for k, i in np.argwhere(size > 0)]
+        self.longest = np.array([size[k, i] for k, i in self.side])
+        self.of_z = np.hstack([np.eye(2 * self.n), np.zeros((2 * self.n, len(self.side)))])  # r = of_z z
+        for column, (k, i) in enumerate(self.side, 2 * self.n):
+            self.of_z[[2 * k, 2 * k + 1], column] = loss[k, i] / size[k, i]
 
 
 def dump(folder, seed):
@@ -91,99 +99,105 @@ def interior_point(W, q, low, high, discs, radius):
 
 
 def from_scratch(p):
-    """Impulses of the problem, of which nothing but W, q, μ, bounds and discs is looked at; approximate."""
-    scale = 1 / np.sqrt(np.diag(p.W))
-    unit = SPEED * np.median(scale)
-    W, q = scale[:, None] * p.W * scale, scale * (p.q + p.W @ p.centre) / unit  # of d, and of all others r
+    """z of the problem, of which nothing but W, q, μ, bounds, discs and sides is looked at; approximate."""
+    W, q = p.of_z.T @ p.W @ p.of_z, p.of_z.T @ p.q
+    scale = 1 / np.sqrt(np.diag(W))
     rows = np.arange(2 * p.n).reshape(-1, 2)
-    # Both rows of sheets by the same factor: a disc must stay one.
-    for i, j in rows[p.sheets]:
-        f = scale[i] / scale[j]
-        W[j] *= f
-        W[:, j] *= f
-        q[j] *= f
-        scale[j] = scale[i]
+    scale[rows[p.sheets, 1]] = scale[rows[p.sheets, 0]]  # both rows of sheets by the same factor: a disc must stay one
+    unit = SPEED * np.median(scale)
+    W, q = scale[:, None] * W * scale, scale * q / unit
     discs, radius = rows[p.sheets], p.disc[p.sheets] / scale[rows[p.sheets][:, 0]] / unit
     normal = p.r[1::2] * 0
     before = np.inf
     for _ in range(100):
-        low, high = np.zeros(2 * p.n), np.full(2 * p.n, np.inf)
-        high[::2] = np.where(p.sheets, np.inf, p.bound / scale[::2] / unit)
-        high[1::2] = np.where(p.sheets, np.inf, np.maximum(p.mu * normal / scale[1::2] / unit, 1e-9))
-        low[1::2] = -high[1::2]
-        x = scale * unit * interior_point(W, q, low, high, discs, radius) + p.centre
-        normal = np.where(p.sheets, 0, np.maximum(x[::2], 0))
-        change = np.abs(p.W @ (x - before)).max() if np.all(np.isfinite(before)) else np.inf
+        low, high = np.zeros(len(q)), np.full(len(q), np.inf)
+        high[:2 * p.n:2] = np.where(p.sheets, np.inf, p.bound / scale[:2 * p.n:2] / unit)
+        high[1:2 * p.n:2] = np.where(p.sheets, np.inf, np.maximum(p.mu * normal / scale[1:2 * p.n:2] / unit, 1e-9))
+        low[1:2 * p.n:2] = -high[1:2 * p.n:2]
+        high[2 * p.n:] = p.longest / scale[2 * p.n:] / unit
+        z = scale * unit * interior_point(W, q, low, high, discs, radius)
+        normal = np.where(p.sheets, 0, np.maximum(z[:2 * p.n:2], 0))
+        change = np.abs(p.W @ p.of_z @ (z - before)).max() if np.all(np.isfinite(before)) else np.inf
         if change < 1e-7 * SPEED:
-            return x
-        before = x
+            return z
+        before = z
     raise AssertionError("the sequence of friction bounds has not converged")
 
 
 def polish(p, x):
     """The equations of the rows that hold and of those that give way, told apart by an approximate solution, solved to
-    the last digits."""
-    u = p.W @ x + p.q
+    the last digits: r."""
+    W, q, m = p.of_z.T @ p.W @ p.of_z, p.of_z.T @ p.q, len(x)
+    u = W @ x + q
     small = 2e-5 * SPEED
 
-    def equations(r):
-        v, E, J = p.W @ r + p.q, np.zeros(2 * p.n), np.zeros((2 * p.n, 2 * p.n))
+    def bounded(E, J, i, z, v, bound):
+        w = W[i, i]
+        if u[i] > small or x[i] * w < small:                                     # open
+            E[i], J[i, i] = z[i] * w, w
+        elif u[i] < -small or bound - x[i] < small / w:                          # gives way
+            E[i], J[i, i] = (z[i] - bound) * w, w
+        else:
+            E[i], J[i] = v[i], W[i]
+
+    def equations(z):
+        v, E, J = W @ z + q, np.zeros(m), np.zeros((m, m))
+        for i in range(2 * p.n, m):
+            bounded(E, J, i, z, v, p.longest[i - 2 * p.n])
         for k in range(p.n):
             i, j = 2 * k, 2 * k + 1
             if p.sheets[k]:
                 if np.hypot(u[i], u[j]) < small:                                 # they stick
-                    E[[i, j]], J[[i, j]] = v[[i, j]], p.W[[i, j]]
+                    E[[i, j]], J[[i, j]] = v[[i, j]], W[[i, j]]
                 else:                                                            # on the rim, against the sliding
-                    w, (dx, dy) = p.W[i, i], r[[i, j]] - p.centre[[i, j]]
+                    w, (dx, dy) = W[i, i], z[[i, j]]
                     E[i] = (dx**2 + dy**2 - p.disc[k]**2) * w / (2 * p.disc[k])
                     E[j] = (dx * v[j] - dy * v[i]) / p.disc[k]
                     J[i, i], J[i, j] = dx * w / p.disc[k], dy * w / p.disc[k]
-                    J[j] = (dx * p.W[j] - dy * p.W[i]) / p.disc[k]
+                    J[j] = (dx * W[j] - dy * W[i]) / p.disc[k]
                     J[j, i] += v[j] / p.disc[k]
                     J[j, j] -= v[i] / p.disc[k]
                 continue
-            w = p.W[i, i]
-            if u[i] > small or x[i] * w < small:                                 # open
-                E[i], J[i, i] = r[i] * w, w
-            elif u[i] < -small or p.bound[k] - x[i] < small / w:                 # gives way
-                E[i], J[i, i] = (r[i] - p.bound[k]) * w, w
+            bounded(E, J, i, z, v, p.bound[k])
+            if abs(u[j]) < small and abs(x[j]) * W[j, j] < p.mu[k] * x[i] * W[j, j] - small:
+                E[j], J[j] = v[j], W[j]
             else:
-                E[i], J[i] = v[i], p.W[i]
-            if abs(u[j]) < small and abs(x[j]) * p.W[j, j] < p.mu[k] * x[i] * p.W[j, j] - small:
-                E[j], J[j] = v[j], p.W[j]
-            else:
-                side = -np.sign(u[j]) if abs(u[j]) >= small else np.sign(x[j])
-                E[j], J[j, j], J[j, i] = (r[j] - side * p.mu[k] * r[i]) * w, w, -side * p.mu[k] * w
+                side, w = -np.sign(u[j]) if abs(u[j]) >= small else np.sign(x[j]), W[i, i]
+                E[j], J[j, j], J[j, i] = (z[j] - side * p.mu[k] * z[i]) * w, w, -side * p.mu[k] * w
         return E, J
 
-    r = x.copy()
+    z = x.copy()
     for _ in range(20):
-        E, J = equations(r)
-        r = r - np.linalg.lstsq(J, E, rcond=1e-13)[0]
-    E, J = equations(r)
-    return r, np.abs(E).max(), np.linalg.cond(J / np.diag(p.W)[:, None])
+        E, J = equations(z)
+        z = z - np.linalg.lstsq(J, E, rcond=1e-13)[0]
+    E, J = equations(z)
+    return p.of_z @ z, np.abs(E).max(), np.linalg.cond(J / np.diag(W)[:, None])
 
 
 @pytest.mark.parametrize("seed", quick(range(1, 11), 1, 4, 9))
 def test_impulses_of_a_cluster(tmp_path, seed):
     p = dump(tmp_path, seed)
     # The law, row by row.
-    rows = np.arange(2 * p.n).reshape(-1, 2)
-    d = p.r - p.centre
-    size, slide = np.hypot(*d[rows[p.sheets]].T), np.hypot(*p.u[rows[p.sheets]].T)
-    middle = np.hypot(*p.centre[rows[p.sheets]].T)
-    assert np.sum(middle > 1e-3 * p.disc[p.sheets]) >= 2 and np.all(middle < p.disc[p.sheets] * (1 + 1e-12))
-    assert p.sheets.sum() >= 3 and np.all(size <= p.disc[p.sheets] * (1 + 1e-12))
-    slides = slide > 1e-6 * SPEED
-    np.testing.assert_allclose(size[slides], p.disc[p.sheets][slides], rtol=1e-6)
-    assert np.all((d[rows[p.sheets]] * p.u[rows[p.sheets]]).sum(axis=1)[slides] < -(1 - 1e-6) *
-                  (size * slide)[slides])
+    rows = np.arange(2 * p.n).reshape(-1, 2)[p.sheets]
+    r, u = p.r[rows], p.u[rows]
+    directions = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 721)])
+    sides = np.zeros((p.n, 2, 2))
+    for column, (k, i) in enumerate(p.side):
+        sides[k, i] = p.longest[column] * p.of_z[[2 * k, 2 * k + 1], 2 * p.n + column]
+
+    def reach(e):  # of each pair of sheets along e [sheets, 2]
+        return np.maximum(0, np.einsum("kic,kc->ki", sides[p.sheets], e)).sum(axis=1) + p.disc[p.sheets] * np.hypot(*e.T)
+
+    assert len(p.side) >= 4 and p.sheets.sum() >= 3
+    for e in directions:
+        assert np.all(r @ e <= reach(np.tile(e, (len(r), 1))) * (1 + 1e-12))
+    slides = np.hypot(*u.T) > 1e-6 * SPEED
+    np.testing.assert_allclose(-(r * u).sum(axis=1)[slides], reach(-u)[slides], rtol=1e-6)
     at_bound = (p.u[::2] < -1e-6 * SPEED) & ~p.sheets
     np.testing.assert_allclose(p.r[::2][at_bound], p.bound[at_bound], rtol=1e-6)
     # Another method, which has seen nothing of the solution.
     x = from_scratch(p)
-    u = p.W @ x + p.q
-    assert np.abs(u - p.u).max() < 1e-3 * SPEED
+    assert np.abs(p.W @ p.of_z @ x + p.q - p.u).max() < 1e-3 * SPEED
     r, error, _ = polish(p, x)
     assert error < 1e-13
     assert np.abs(p.W @ r + p.q - p.u).max() < 1e-8 * SPEED
