@@ -46,16 +46,16 @@ def read(path):
             dt = float(places.attrs["dt"])
             impulse, normal = f["solution/r"][()].reshape(-1, 2), places["normal"][()]
             force, drawn = impulse[:, 0] / dt, np.ones(len(impulse), bool)
-            # Floes that lie over each other have a contact of its own: losses of their edge, along the middle of its
-            # disc and at most twice as far, and friction, which is no normal force.
+            # Floes that lie over each other have a contact of their own: losses of their edge, at most both sides of a
+            # parallelogram together, and friction, which is no normal force.
             if "disc" in f:
                 sheets = ~np.isnan(f["disc"][()])
-                centre = (f["centre"][()] if "centre" in f else np.zeros(2 * len(force))).reshape(-1, 2)
-                half = np.hypot(*centre.T)
-                drawn = ~sheets | (half > 0)
+                loss = f["loss"][()].reshape(-1, 2, 2).sum(axis=1) if "loss" in f else np.zeros((len(force), 2))
+                most = np.hypot(*loss.T)
+                drawn = ~sheets | (most > 0)
                 at = sheets & drawn
-                normal[at] = centre[at] / half[at, None]
-                force[at] = np.clip((impulse * normal).sum(axis=1)[at], 0, 2 * half[at]) / dt
+                normal[at] = loss[at] / most[at, None]
+                force[at] = np.clip((impulse * normal).sum(axis=1)[at], 0, most[at]) / dt
             return Contacts(float(places.attrs["time"]), places["body"][()][drawn], normal[drawn],
                             places["lever"][()].reshape(-1, 2, 2)[drawn], force[drawn], places["pose"][()])
     except FileNotFoundError:

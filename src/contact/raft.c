@@ -227,16 +227,16 @@ static void take_losses(const bt_world *w, bt_cell *t, bt_idx edge, double p, do
     bt_limit *l = &t->laws.limits[edge];
     const double length = bt_max(2 * fabs(u->ran[1] - u->ran[0]), thinner(&w->bodies, u->a, u->b));
     const double part = 0.5 * stored_load(w, u->a, u->b) * length * w->par.dt;
-    double all = 0, rest = 0;
+    double losses = 0;
     for (int i = 0; i < u->n; i++) {
-        all += l->flat[i], rest += bt_max(0, l->flat[i] - part);
+        losses += bt_max(0, l->flat[i] - part);
         l->flat[i] = bt_min(l->flat[i], part);
         l->most[i] = bt_min(l->most[i], part);
         l->cap[i] = bt_min(l->cap[i], part);
     }
-    const double due = reached(w, u, t->gaps[edge].gap[0]), aside = due * all * s;
+    losses *= reached(w, u, t->gaps[edge].gap[0]);
     for (int c = 0; c < 2; c++) {
-        const double n = due * rest * (c ? u->ny : u->nx), along = aside * (c ? u->nx : -u->ny);
+        const double n = losses * (c ? u->ny : u->nx), along = losses * s * (c ? u->nx : -u->ny);
         e[0][c] = p * n + along;
         e[1][c] = (1 - p) * n - along;
     }

@@ -27,14 +27,13 @@
 // Losses. R = (q0 − E') L Δt is lost by what goes under. It acts at the centroid of the overlap, against u, the velocity
 // of b against a there, and joins the friction of the sheets (below) in one contact:
 //     λ = α e_1 + β e_2 + d,   0 <= α, β <= 1,   |d| <= R_s,   of these the one that takes most power, −λ · u
-//     e_1 = R p n + S s t,   e_2 = R (1 − p) n − S s t,   S = q0 L Δt,   t square to n
+//     e_1 = R (p n + s t),   e_2 = R ((1 − p) n − s t),   t square to n
 // Where an edge of one floe advances inside the other it covers fresh ice. Half of each such edge is a push f_k, square
 // to it, from a to b: Σ f_k = L n, and the area that is newly covered, the mean of that of both floes, grows at the rate
 // Σ max(0, −f_k · u). Sums of the pushes with f_k · t > 0 and < 0, divided by L, are p n + s t and (1 − p) n − s t.
 // - In line a pair loses R v, with v = −n · u the rate of going under. The area of the overlap grows by L v Δt, and costs
 //   the same at any angle to n as long as both e · u < 0.
-// - Along the edge its ends go over fresh ice, by s L a length, half the width of the overlap. There all of q0 is lost:
-//   what is stored where it covers is lost where it uncovers.
+// - Along the edge the ends of the overlap go over fresh ice, by s L a length, half its width.
 // - Back costs nothing: p is kept in 0 to 1. s is kept below 1/2, as corners of squares have it. Otherwise a floe that is
 //   all but under another one would go on losing.
 // Two squares have exactly this, in line or out of it. The power is, Δt aside,
@@ -45,7 +44,7 @@
 // whatever μ is and whatever the sweeps start from; impulses are unique where something moves. So there is no Coulomb
 // friction on an edge that has rafted. Pairs that have not have it, and as with all Coulomb friction uniqueness is not
 // shown for them.
-// Below A*, neither R nor S is due. Both are taken times
+// Below A*, R is not due. It is taken times
 //     max(0, 1 − gap/(Δt c + slop))
 // c: approach of the edge by the velocities without contacts. So a gap that is crossed in a step of any length takes
 // the losses of what goes under beyond it, and none where it is not crossed but for a slop: a cut there would let go of
@@ -54,7 +53,7 @@
 // Rejected: losses in the load on the chord (λ <= q0 L). It pushes sheets aside with five times what is stored, and a
 // row of squares that is 1 cm out of line slips out. A disc about ½ R n of radius ½ R. Sheets then lose ½ R |u| along
 // their edge however little lies on each other, which welds them together: the mean of a berg model in a basin with 80 %
-// ice was 19 N, for 16 N with rigid floes and 8 N with this law. A force R cos α against the motion. It is not monotone,
+// ice was 19 N, for 16 N with rigid floes and 7 N with this law. A force R cos α against the motion. It is not monotone,
 // and at rest it may bear any load of the disc while it bears none when it slides along the edge: two solutions. More
 // Coulomb friction on the edge, (q0 − E')/(2 q0): the same area costs 1.11, 1.23 and 1.40 times as much at 15, 30 and
 // 45°. A bound of its own with the gap as its bias, in place of the taper: a second contact a pair.
