@@ -45,19 +45,10 @@ def read(path):
             places = f["places"]
             dt = float(places.attrs["dt"])
             impulse, normal = f["solution/r"][()].reshape(-1, 2), places["normal"][()]
-            force, drawn = impulse[:, 0] / dt, np.ones(len(impulse), bool)
-            # Floes that lie over each other have a contact of their own: losses of their edge, at most both sides of a
-            # parallelogram together, and friction, which is no normal force.
-            if "disc" in f:
-                sheets = ~np.isnan(f["disc"][()])
-                loss = f["loss"][()].reshape(-1, 2, 2).sum(axis=1) if "loss" in f else np.zeros((len(force), 2))
-                most = np.hypot(*loss.T)
-                drawn = ~sheets | (most > 0)
-                at = sheets & drawn
-                normal[at] = loss[at] / most[at, None]
-                force[at] = np.clip((impulse * normal).sum(axis=1)[at], 0, most[at]) / dt
+            # Floes that lie over each other have a contact of their own, which has no normal.
+            drawn = np.isnan(f["disc"][()]) if "disc" in f else np.ones(len(impulse), bool)
             return Contacts(float(places.attrs["time"]), places["body"][()][drawn], normal[drawn],
-                            places["lever"][()].reshape(-1, 2, 2)[drawn], force[drawn], places["pose"][()])
+                            places["lever"][()].reshape(-1, 2, 2)[drawn], impulse[drawn, 0] / dt, places["pose"][()])
     except FileNotFoundError:
         raise RunError(path, "no such file",
                        "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None

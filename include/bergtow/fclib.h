@@ -32,11 +32,11 @@ typedef struct bt_fclib_problem {
     const double *w_val;   ///< 1/kg
     const double *q, *mu;  ///< [2n] m/s, [n]
     const double *u, *r;   ///< [2n] solution, or both NULL
-    // What the format does not know, stored beside it as /bound, /disc, /loss and /places; each may be NULL.
+    // What the format does not know, stored beside it as /bound, /disc, /ends and /places; each may be NULL.
     const double *bound;   ///< [n] N s, 0 <= r_n <= bound; u_n < 0 where it holds
-    /// [n] N s, radius of the disc in which both components of a contact lie; NaN: no such contact
+    /// [n] N s, radius of the disc of which both components of a contact have a point; NaN: no such contact
     const double *disc;
-    const double *loss;    ///< [4n] N s, both sides (x, y) of the parallelogram, 0 of other contacts; NULL: 0 of all
+    const double *ends;    ///< [2n] N s, and one of the line from −ends to ends; NULL: 0 of all
     const bt_fclib_places *places;
     const char *title, *description; ///< free text, or NULL
 } bt_fclib_problem;

@@ -84,12 +84,10 @@ typedef struct bt_rise {
 typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach; flat[0] of sheets: most that their friction bears, N s
     double most[2];  ///< N s
+    double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
     union {
-        struct {
-            double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
-            double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
-        };
-        double loss[2][2]; ///< of sheets: e_1 and e_2 of contact/raft.h along x and y, N s
+        double place[2];  ///< approach that closes the gap, and nothing gives way, m/s
+        double ends[2];   ///< of sheets: most that the ends of their overlap bear, along x and y, N s
     };
     double grown[2]; ///< by how much the bodies go into each other in this step, m
     bt_rise *rise;   ///< NULL where no law has a rising bound

@@ -95,13 +95,13 @@ static double inside_of(const double *q, int n, double x, double y, const double
 }
 
 void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *o,
-                         double blend, double grad[2], double *turn)
+                         double blend, double grad[2])
 {
     const bt_bodies *s = &w->bodies;
     double off[2];
     bt_bodies_offset(w, a, b, off);
     const double *v = o->v[o->now];
-    grad[0] = grad[1] = *turn = 0;
+    grad[0] = grad[1] = 0;
     for (int k = 0; k < o->n; k++) {
         const double *p = v + 2 * k, *q = v + 2 * (k + 1 < o->n ? k + 1 : 0);
         const double ex = q[0] - p[0], ey = q[1] - p[1], length = sqrt(ex * ex + ey * ey);
@@ -116,6 +116,5 @@ void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t p
         o->push[k][0] = -weight * ey, o->push[k][1] = weight * ex;
         grad[0] += weight * ey;
         grad[1] -= weight * ex;
-        *turn += weight * (-middle[0] * ex - middle[1] * ey);
     }
 }

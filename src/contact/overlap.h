@@ -22,13 +22,12 @@ void bt_overlap_clip(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[
 /// Area (m²) and centroid (m, in the frame of a).
 double bt_overlap_area(const bt_overlap *o, double centroid[2]);
 
-/// How the area A changes: grad = ∂A/∂(displacement of b), m; *turn = the moment of that gradient about the centroid of
-/// a, m²: ∂A/∂θ_a = −turn, ∂A/∂θ_b = turn − d × grad with d from a to b. The boundary of the overlap is a closed line,
-/// so with n the outward normal
-///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl,   turn = ½ (∫_b − ∫_a) r × n dl
+/// How the area A changes when b is moved: grad = ∂A/∂(displacement of b), m. The boundary of the overlap is a closed
+/// line, so with n the outward normal
+///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl
 /// Where edges of both lie on each other and face the same way (rectangles in a row) the gradient jumps as one passes
 /// the other. Such edges count for neither; within `blend` of each other in part.
 void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *o,
-                         double blend, double grad[2], double *turn);
+                         double blend, double grad[2]);
 
 #endif

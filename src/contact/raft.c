@@ -3,7 +3,6 @@
 #include "contact/raft.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "contact/overlap.h"
 #include "contact/row.h"
@@ -146,49 +145,45 @@ static void set_point(bt_manifold *m, double x, double y, const double off[2], d
     m->p[m->n_points++] = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - off[0], y - off[1]}, .feature = feature};
 }
 
-/// The edge: two points on the line of the gradient, as near to the centroid of the overlap as that line comes.
-static void edge_of(const double grad[2], double turn, double length, double gap, const double centroid[2],
-                    const double off[2], bt_manifold *m)
+/// The edge: two points along it, about the centroid of the overlap.
+static void edge_of(const double grad[2], double length, double gap, const double centroid[2], const double off[2],
+                    bt_manifold *m)
 {
     m->nx = -grad[0] / length, m->ny = -grad[1] / length;
-    const double lever = -turn / length, along = centroid[0] * m->nx + centroid[1] * m->ny;
-    const double x = lever * m->ny + along * m->nx, y = -lever * m->nx + along * m->ny;
     for (int side = -1; side <= 1; side += 2)
-        set_point(m, x - side * 0.25 * length * m->ny, y + side * 0.25 * length * m->nx, off, gap,
+        set_point(m, centroid[0] - side * 0.25 * length * m->ny, centroid[1] + side * 0.25 * length * m->nx, off, gap,
                   side < 0 ? 0xfff00000u : 0xfff00001u);
 }
 
-/// p and s of raft.h: of a push that goes along the edge by less than the blend, e_1 and e_2 both have a part.
-static void split(const bt_overlap *o, const bt_manifold *edge, double length, double blend, double *p, double *s)
+/// s of raft.h: of a push that goes along the edge by less than the blend, a part.
+static double part_of_ends(const bt_overlap *o, const bt_manifold *edge, double length, double blend)
 {
-    const double nx = edge->nx, ny = edge->ny;
-    double n = 0, t = 0;
+    double sum = 0;
     for (int k = 0; k < o->n; k++) {
-        const double along = o->push[k][1] * nx - o->push[k][0] * ny;
-        const double part = bt_max(0, bt_min(1, 0.5 * (1 + along / blend)));
-        n += part * (o->push[k][0] * nx + o->push[k][1] * ny);
-        t += part * along;
+        const double along = o->push[k][1] * edge->nx - o->push[k][0] * edge->ny;
+        sum += along * bt_max(0, bt_min(1, 0.5 * (1 + along / blend)));
     }
-    *p = bt_max(0, bt_min(1, n / length)), *s = bt_min(0.5, t / length);
+    return bt_min(0.5, sum / length);
 }
 
-/// False without an edge; `sheets` always: with p and s in place of a normal.
+/// False without an edge; `sheets` always, along the edge and s long in place of a normal.
 static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
 {
     bt_overlap o;
-    double grad[2], turn, centroid[2], off[2];
+    double grad[2], centroid[2], off[2];
     bt_overlap_clip(w, p->a, p->b, p->part, 0, 0, &o);
     bt_overlap_area(&o, centroid);
     // rounding must not tell which edge is inside
-    bt_overlap_gradient(w, p->a, p->b, p->part, &o, least_blend(w), grad, &turn);
+    bt_overlap_gradient(w, p->a, p->b, p->part, &o, least_blend(w), grad);
     bt_bodies_offset(w, p->a, p->b, off);
     *edge = (bt_manifold){.a = p->a, .b = p->b};
     *sheets = (bt_manifold){.a = p->a, .b = p->b};
     sheets->p[0] = (bt_point){.ra = {centroid[0], centroid[1]}, .rb = {centroid[0] - off[0], centroid[1] - off[1]}};
     const double length = bt_hypot(grad[0], grad[1]);
     if (!(length > LEAST_LENGTH * thinner(&w->bodies, p->a, p->b))) return false;
-    edge_of(grad, turn, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
-    split(&o, edge, length, least_blend(w), &sheets->nx, &sheets->ny);
+    edge_of(grad, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
+    const double part = part_of_ends(&o, edge, length, least_blend(w));
+    sheets->nx = -part * edge->ny, sheets->ny = part * edge->nx;
     return true;
 }
 
@@ -209,8 +204,8 @@ static bt_patch flush_part(const bt_manifold *m)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-/// Part of the losses that an edge bears: of the way that it would make in the step by the velocities without contacts
-/// what is left beyond the gap, with a slop on both.
+/// Part of the way that an edge would make in the step by the velocities without contacts which is left beyond its gap,
+/// with a slop on both.
 static double reached(const bt_world *w, const bt_contact *edge, double gap)
 {
     const bt_bodies *s = &w->bodies;
@@ -218,28 +213,6 @@ static double reached(const bt_world *w, const bt_contact *edge, double gap)
                  free = bt_mean_normal_velocity(edge, &s->vel_free[edge->a], &s->vel_free[edge->b]);
     const double way = w->par.dt * bt_max(0, -bt_min(before, free));
     return bt_max(0, 1 - gap / (way + least_blend(w)));
-}
-
-/// Leaves an edge the stored part of its bound, and makes e_1 and e_2 of the rest.
-static void take_losses(const bt_world *w, bt_cell *t, bt_idx edge, double p, double s, double e[2][2])
-{
-    const bt_contact *u = &t->contacts[edge];
-    bt_limit *l = &t->laws.limits[edge];
-    const double length = bt_max(2 * fabs(u->ran[1] - u->ran[0]), thinner(&w->bodies, u->a, u->b));
-    const double part = 0.5 * stored_load(w, u->a, u->b) * length * w->par.dt;
-    double losses = 0;
-    for (int i = 0; i < u->n; i++) {
-        losses += bt_max(0, l->flat[i] - part);
-        l->flat[i] = bt_min(l->flat[i], part);
-        l->most[i] = bt_min(l->most[i], part);
-        l->cap[i] = bt_min(l->cap[i], part);
-    }
-    losses *= reached(w, u, t->gaps[edge].gap[0]);
-    for (int c = 0; c < 2; c++) {
-        const double n = losses * (c ? u->ny : u->nx), along = losses * s * (c ? u->nx : -u->ny);
-        e[0][c] = p * n + along;
-        e[1][c] = (1 - p) * n - along;
-    }
 }
 
 /// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
@@ -250,8 +223,12 @@ static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, c
     bt_limit *l = &t->laws.limits[j];
     const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
     l->flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
-    memset(l->loss, 0, sizeof l->loss);
-    if (edge >= 0) take_losses(w, t, edge, m->nx, m->ny, l->loss);
+    double load = 0;
+    if (edge >= 0) {
+        const bt_limit *e = &t->laws.limits[edge];
+        load = (e->flat[0] + e->flat[1]) * reached(w, &t->contacts[edge], t->gaps[edge].gap[0]);
+    }
+    l->ends[0] = load * m->nx, l->ends[1] = load * m->ny;
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
@@ -265,26 +242,15 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
         bound_sheets(w, t, j, p->contact, m, &t->laws.memory[at]);
         return;
     }
-    if (at >= 0) t->contacts[j].mu = 0; // what acts along the edge is in the contact of the sheets
-    const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
+    const double h = thinner(&w->bodies, m->a, m->b), stored = stored_load(w, m->a, m->b);
+    double load = line_load(w, m->a, m->b);
+    if (at >= 0) load = stored + (load - stored) * reached(w, &t->contacts[j], m->p[0].gap);
     const bt_closing c = bt_law_closing(w, t, j, m);
     const bt_patch edge = at >= 0 ? chord_of(m) : flush_part(m);
     for (int i = 0; i < m->n_points; i++) {
         const double length = edge.length * bt_law_share(m, i, edge, &c);
-        bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
+        bt_law_narrow(l, i, load * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
     }
-}
-
-double bt_raft_pressing(const bt_cell *t, bt_idx j)
-{
-    const bt_contact *u = &t->contacts[j];
-    if (u->n > 0) return u->ln[0] + u->ln[1];
-    const bt_idx edge = t->search.pairs[u->pair].contact;
-    if (edge < 0) return 0;
-    const bt_contact *e = &t->contacts[edge];
-    const bt_limit *l = &t->laws.limits[j];
-    const double most = bt_hypot(l->loss[0][0] + l->loss[1][0], l->loss[0][1] + l->loss[1][1]);
-    return e->ln[0] + e->ln[1] + bt_max(0, bt_min(most, u->ln[0] * e->nx + u->lt * e->ny));
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------
@@ -299,14 +265,14 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
     bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
 }
 
-/// Part of the work of sheets that is losses of their edge: of D of raft.h at the velocities of the step.
-static double losses_of(const bt_world *w, const bt_contact *u, const bt_limit *l)
+/// Sheets with the load of their ends alone.
+static bt_contact ends_of(const bt_contact *sheets, const bt_limit *l)
 {
-    const bt_vel *a = &w->bodies.vel[u->a], *b = &w->bodies.vel[u->b];
-    const double x = bt_normal_velocity(u, 0, a, b), y = bt_tangent_velocity(u, a, b);
-    double lost = 0;
-    for (int k = 0; k < 2; k++) lost += bt_max(0, -(l->loss[k][0] * x + l->loss[k][1] * y));
-    return lost > 0 ? lost / (lost + l->flat[0] * bt_hypot(x, y)) : 0;
+    bt_contact u = *sheets;
+    const double *e = l->ends, square = e[0] * e[0] + e[1] * e[1];
+    const double part = square > 0 ? bt_clamp((u.ln[0] * e[0] + u.lt * e[1]) / square, 1) : 0;
+    u.ln[0] = part * e[0], u.lt = part * e[1];
+    return u;
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
@@ -318,9 +284,10 @@ static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
     if (u->n == 0) {
         t->laws.memory[at].value[2] = u->ln[0];
         t->laws.memory[at].value[3] = u->lt;
-        const double work = -bt_contacts_work(w, u), part = losses_of(w, u, l);
-        bt_sum_add(&number[EDGE_WORK], part * work);
-        bt_sum_add(&number[FRICTION_WORK], (1 - part) * work);
+        const bt_contact ends = ends_of(u, l);
+        const double of_ends = -bt_contacts_work(w, &ends);
+        bt_sum_add(&number[EDGE_WORK], of_ends);
+        bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(w, u) - of_ends);
         return;
     }
     bool begins = false;

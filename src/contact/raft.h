@@ -14,52 +14,46 @@
 //
 // Edge. To let the overlapped area A grow takes q0 dA, of which E' dA is stored and the rest lost:
 //     E' = min(E, q0) = min(ρ_i (1 − ρ_i/ρ_w) g h_a h_b, q0)   N/m
-// What is stored is a force of position, the gradient of E' A:
+// The load of the edge is along the gradient of A,
 //     grad = ∂A/∂(displacement of b),   L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L
-//     gap = (A* − A)/L,   0 <= λ <= E' L Δt,   w < −gap/Δt only where λ is at its bound
+//     gap = (A* − A)/L,   0 <= λ <= q0 L Δt,   w < −gap/Δt only where λ is at its bound
 // A*: the largest area so far; below it the edge bears nothing: what was stored counts as lost when sheets slide back.
-// For two outlines that cross twice, L is the chord between the crossings, n is square to it, and the resultant acts at
-// its middle. Turning is in it, too: a closed line under uniform pressure bears no resultant, so that on the edge of b
-// inside a and that on the chord are the same. L is that of the start of the step: first order in Δt, as the area
-// itself. Two points on the chord, L/4 from its middle, take half of the bound each. No edge is shorter than h
-// (assumed).
-//
-// Losses. R = (q0 − E') L Δt is lost by what goes under. It acts at the centroid of the overlap, against u, the velocity
-// of b against a there, and joins the friction of the sheets (below) in one contact:
-//     λ = α e_1 + β e_2 + d,   0 <= α, β <= 1,   |d| <= R_s,   of these the one that takes most power, −λ · u
-//     e_1 = R (p n + s t),   e_2 = R ((1 − p) n − s t),   t square to n
-// Where an edge of one floe advances inside the other it covers fresh ice. Half of each such edge is a push f_k, square
-// to it, from a to b: Σ f_k = L n, and the area that is newly covered, the mean of that of both floes, grows at the rate
-// Σ max(0, −f_k · u). Sums of the pushes with f_k · t > 0 and < 0, divided by L, are p n + s t and (1 − p) n − s t.
-// - In line a pair loses R v, with v = −n · u the rate of going under. The area of the overlap grows by L v Δt, and costs
-//   the same at any angle to n as long as both e · u < 0.
-// - Along the edge the ends of the overlap go over fresh ice, by s L a length, half its width.
-// - Back costs nothing: p is kept in 0 to 1. s is kept below 1/2, as corners of squares have it. Otherwise a floe that is
-//   all but under another one would go on losing.
-// Two squares have exactly this, in line or out of it. The power is, Δt aside,
-//     D(u) = max(0, −e_1 · u) + max(0, −e_2 · u) + R_s |u|
-// D is convex, and λ the impulse of largest power in a convex set (associated flow); so is the edge's, 0 <= λ <= E' L Δt
-// with its gap. Without other contacts, the velocities of floes that have rafted are therefore the one minimum of
-//     ½ (U − U_free)ᵀ M (U − U_free) + Σ D + Σ E' L Δt max(0, −w − gap/Δt)
-// whatever μ is and whatever the sweeps start from; impulses are unique where something moves. So there is no Coulomb
-// friction on an edge that has rafted. Pairs that have not have it, and as with all Coulomb friction uniqueness is not
-// shown for them.
-// Below A*, R is not due. It is taken times
+// For two outlines that cross twice, L is the chord between the crossings and n is square to it. Two points on the line
+// along the chord through the centroid of the overlap, L/4 from it, take half of the bound each. There lies the
+// resultant of losses over the whole overlap, which turns a floe back that goes under askew. Rejected: the middle of the
+// chord, where the gradient has its moment. A row of squares out of line turned and buckled sooner (0.94 of its load
+// where one pair was under by 1/50, and 1 with the centroid). L is that of the start of the step: first order in Δt, as
+// the area itself. No edge is shorter than h (assumed). Along the edge there is Coulomb friction, as before it rafts.
+// Of the losses below A*, (q0 − E') L Δt, the part
 //     max(0, 1 − gap/(Δt c + slop))
-// c: approach of the edge by the velocities without contacts. So a gap that is crossed in a step of any length takes
-// the losses of what goes under beyond it, and none where it is not crossed but for a slop: a cut there would let go of
-// an edge that bears load whenever a residual opens it, and sheets would creep. Rejected: all of R in a step in which
-// the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work for the same area).
-// Rejected: losses in the load on the chord (λ <= q0 L). It pushes sheets aside with five times what is stored, and a
-// row of squares that is 1 cm out of line slips out. A disc about ½ R n of radius ½ R. Sheets then lose ½ R |u| along
+// is in the bound, with c the approach of the edge by the velocities without contacts. So a gap that is crossed in a
+// step of any length takes the losses of what goes under beyond it, and none where it is not crossed but for a slop: a
+// cut there would let go of an edge that bears load whenever a residual opens it, and sheets would creep. Rejected: all
+// of them in a step in which the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work for the
+// same area).
+//
+// Ends. An edge inside the other floe that advances covers fresh ice. Half of each such edge is a push f_k, square to
+// it, from a to b: Σ f_k = L n, and the area that is newly covered, the mean of that of both floes, grows at the rate
+// Σ max(0, −f_k · u), with u the velocity of b against a at the centroid of the overlap. Along the chord it grows although
+// A does not, by s L a length, where s L is the sum of the pushes' parts along t, square to n, that are above 0: half
+// the width of the overlap. What is stored there is lost at the other end, so that this costs q0 an area. The ends of the
+// overlap bear
+//     |λ_t| <= q0 s L Δt   against t · u
+// times the same part below A*. They hold a row of squares in line, which the edge pushes aside with the tilt of its
+// chord: of two that are under by d, s L is d cos² α, with tan α = d/a, and the edge pushes with q0 d. Going under in
+// line, such squares pay 1 + sin² α times q0 for an area. s is kept below 1/2, as corners of squares have it; otherwise a
+// floe that is all but under another one would go on paying.
+// Rejected: no ends. A row of squares that is 1 cm out of line slips out, without a load where there is no friction.
+// Losses as a disc about ½ R n of radius ½ R, R = (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R along
 // their edge however little lies on each other, which welds them together: the mean of a berg model in a basin with 80 %
-// ice was 19 N, for 16 N with rigid floes and 7 N with this law. A force R cos α against the motion. It is not monotone,
-// and at rest it may bear any load of the disc while it bears none when it slides along the edge: two solutions. More
-// Coulomb friction on the edge, (q0 − E')/(2 q0): the same area costs 1.11, 1.23 and 1.40 times as much at 15, 30 and
-// 45°. A bound of its own with the gap as its bias, in place of the taper: a second contact a pair.
-// The losses at the middle of the chord, where translation has them, too: a row turns out of line sooner (0.73 of its
-// load where it bears 0.99 with the centroid, which moves to the side that is deeper). That turning alone about the
-// centroid costs nothing is assumed.
+// ice was 19 N, for 16 N with rigid floes and 13 N with this law. Losses in the parallelogram of the pushes, times
+// (q0 − E')/L, beside the edge with E' alone. An area costs exactly q0 at any angle, but friction of the edge has no
+// place in it: the same mean was 7 N, and a row buckled at 1/100 of a side. A force against the motion with the same cost
+// for an area in every direction: at rest it may bear what it does not bear sliding along the edge, two solutions.
+// Without friction the law is associated: the power, Δt aside, is
+//     q0 L max(0, −n · u) + q0 s L |t · u| + R_s |u|
+// (R_s below), which is convex, so that velocities are the one minimum of a convex function. With Coulomb friction
+// existence and uniqueness are as for all contacts; a cold start finds the velocities of a warm one.
 //
 // Rejected: the depth along the axis of least overlap, as in contacts that crush. That axis flips once a floe is more
 // than half under, so the side of entry would have to be remembered; and floes that slide along it would go on
@@ -72,20 +66,20 @@
 // Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they
 // overlap, friction of at most
 //     R_s = μ (ρ_w − ρ_i) g h A Δt
-// acts against sliding at the centroid of the overlap. With the losses it is a contact of its own without contact
-// points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, R_s in flat[0] of its bounds, and
-// e_1 and e_2 in `loss`. Its update is one step of
+// acts against sliding at the centroid of the overlap. With the ends it is a contact of its own without contact points
+// (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, R_s in flat[0] of its bounds and q0 s L Δt t
+// in `ends`. Its update is one step of
 //     λ <- proj(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
 // which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, for
 // which the records and batches of all rigid ice would grow.
 //
-// The stored part of the load pushes sheets apart; losses and friction hold them, friction alone from an overlap of
-// (ρ_i/ρ_w) h/μ on, some 2.5 h. So that an edge bears nothing when it retreats is a fair simplification.
+// What is stored would push sheets apart; friction between them alone holds them from an overlap of (ρ_i/ρ_w) h/μ on,
+// some 2.5 h. So that an edge bears nothing when it retreats is a fair simplification.
 //
 // Memory. While two floes overlap, a pair keeps A*, A when it was last looked at, and the friction as the start of the
 // next solve. At the end of a step A is what it is: second-order terms of the step belong to A*, and the position
 // projection leaves rafted overlap alone. Where ice crushes as well, or an added law bounds the edge, the smaller bound
-// takes the place of q0: what it leaves of R is lost. A pair that has rafted gives way in its area whichever law sets
+// takes the place of q0. A pair that has rafted gives way in its area whichever law sets
 // the bound; crushed depths are kept by pairs that have not.
 //
 // Between which bodies: floes of the field and by hand whose outlines are both convex. Not the towed body, walls and
@@ -107,10 +101,6 @@
 /// sheets on each other / thickness; potential energy of sheets on each other / (area × both thicknesses). Without a
 /// unit: freeboard / thickness.
 enum { BT_RAFT_LINE, BT_RAFT_SHEET, BT_RAFT_RISE, BT_RAFT_FREEBOARD };
-
-/// What contact j of a cell bears along its normal, N s; sheets: with their edge, as friction between them is spread
-/// over them.
-double bt_raft_pressing(const bt_cell *t, bt_idx j);
 
 /// Which of its totals is the area of sheets at the end, m²: the summary also has it over the area of all ice.
 enum { BT_RAFT_TOTAL_AREA = 1 };

@@ -28,7 +28,7 @@ typedef struct {
     bt_gid gid_a, gid_b;
     int point;
     bt_idx a, b;
-    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound, disc, loss[2][2];
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound, disc, ends[2];
 } row;
 
 static int by_gids(const void *p, const void *q)
@@ -71,7 +71,7 @@ static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
                  .lt = u->lt,
                  .bound = INFINITY,
                  .disc = l->flat[0],
-                 .loss = {{l->loss[0][0], l->loss[0][1]}, {l->loss[1][0], l->loss[1][1]}}};
+                 .ends = {l->ends[0], l->ends[1]}};
 }
 
 /// Normal and tangential row of every contact point, in the order of the gids.
@@ -177,7 +177,7 @@ static incidence *incidences_of(const bt_bodies *b, const row *rows, int n, int6
 typedef struct {
     int64_t *ptr;
     int32_t *col;
-    double *val, *q, *mu, *u, *r, *bound, *disc, *loss;
+    double *val, *q, *mu, *u, *r, *bound, *disc, *ends;
 } problem;
 
 /// most: blocks of W, at most.
@@ -188,9 +188,9 @@ static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t mo
     x.ptr = bt_alloc(2 * m + 1, sizeof *x.ptr);
     x.col = bt_alloc(4 * (size_t)most, sizeof *x.col);
     x.val = bt_alloc(4 * (size_t)most, sizeof *x.val);
-    double **const two[] = {&x.q, &x.u, &x.r}, **const one[] = {&x.mu, &x.bound, &x.disc};
-    for (int i = 0; i < 3; i++) *two[i] = bt_alloc(2 * m, sizeof(double)), *one[i] = bt_alloc(m, sizeof(double));
-    x.loss = bt_alloc(4 * m, sizeof(double));
+    double **const two[] = {&x.q, &x.u, &x.r, &x.ends}, **const one[] = {&x.mu, &x.bound, &x.disc};
+    for (int i = 0; i < 4; i++) *two[i] = bt_alloc(2 * m, sizeof(double));
+    for (int i = 0; i < 3; i++) *one[i] = bt_alloc(m, sizeof(double));
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
         const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
@@ -202,7 +202,7 @@ static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t mo
         x.mu[k] = p->mu;
         x.bound[k] = p->bound;
         x.disc[k] = p->disc;
-        memcpy(&x.loss[4 * k], p->loss, sizeof p->loss);
+        x.ends[2 * k] = p->ends[0], x.ends[2 * k + 1] = p->ends[1];
     }
     return x;
 }
@@ -263,10 +263,10 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     const bt_fclib_problem out = {
         .n = n, .w_ptr = x.ptr, .w_col = x.col, .w_val = x.val, .q = x.q, .mu = x.mu, .u = x.u, .r = x.r,
         .bound = bt_laws_on(&w->par) ? x.bound : NULL, .disc = rafts ? x.disc : NULL,
-        .loss = rafts ? x.loss : NULL, .places = &places, .title = "bergtow",
+        .ends = rafts ? x.ends : NULL, .places = &places, .title = "bergtow",
         .description = "contact problem of one time step of broken sea ice, 2-D, with its solution"};
     const bt_status status = bt_fclib_write(path, &out, err);
-    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc, x.loss,
+    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc, x.ends,
                             (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;

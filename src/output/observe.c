@@ -16,7 +16,6 @@
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "contact/raft.h"
 #include "contact/row.h"
 #include "space/cells.h"
 #include "tow/tow.h"
@@ -250,7 +249,8 @@ void bt_observe_contact_force(const bt_world *w, double *force)
     for (bt_idx k = 0; k < w->cells->n; k++)
         for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
             const bt_contact *u = &w->cells->cell[k].contacts[j];
-            const double f = bt_raft_pressing(&w->cells->cell[k], j) / w->par.dt;
+            if (u->n == 0) continue; // sheets: friction, and the ends of their overlap
+            const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
             force[u->a] = bt_max(force[u->a], f);
             force[u->b] = bt_max(force[u->b], f);
         }

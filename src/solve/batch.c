@@ -173,9 +173,7 @@ BT_INLINE void put_sheets(bt_batch *o, const bt_contact *const u[BT_LANES], cons
     for (int l = 0; l < o->n; l++) {
         const bt_mass m = bt_mass_of(u[l], inv);
         o->w[0][l] = m.w[0], o->mn[0][l] = m.mn[0], o->wt[l] = m.wt, o->mt[l] = m.mt;
-        const double (*e)[2] = limits[o->contact[l]].loss;
-        o->BT_LOSS_1_X[l] = e[0][0], o->BT_LOSS_1_Y[l] = e[0][1];
-        o->BT_LOSS_2_X[l] = e[1][0], o->BT_LOSS_2_Y[l] = e[1][1];
+        o->BT_ENDS_X[l] = limits[o->contact[l]].ends[0], o->BT_ENDS_Y[l] = limits[o->contact[l]].ends[1];
     }
 }
 

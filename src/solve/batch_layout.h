@@ -26,11 +26,9 @@ typedef struct bt_batch {
 } bt_batch;
 _Static_assert(sizeof(bt_batch) == 32 * sizeof(bt_vec), "the listed contacts of dense ice, 256 bytes each");
 
-/// e_1 and e_2 of sheets (contact/raft.h), which have one point and so none of these.
-#define BT_LOSS_1_X w12
-#define BT_LOSS_1_Y per_det
-#define BT_LOSS_2_X w[1]
-#define BT_LOSS_2_Y mn[1]
+/// bt_limit.ends of sheets, which have one point and so neither of the two.
+#define BT_ENDS_X w12
+#define BT_ENDS_Y per_det
 
 /// Of the normals; [0] of sheets: of their friction. After the batches of a cell whose contacts have bounds.
 typedef struct bt_batch_bounds {

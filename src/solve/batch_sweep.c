@@ -48,8 +48,8 @@ BT_INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b
 
 BT_INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 
-/// As bt_limit_rim; of m: w, w12 and mn.
-BT_INLINE void rim(const bt_masses *m, const vec bound[2], const vec b[2], vec l[2])
+/// As bt_limit_rim.
+BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[2])
 {
     const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY}, half = {0.5, 0.5, 0.5, 0.5};
     vec least = endless;
@@ -58,10 +58,10 @@ BT_INLINE void rim(const bt_masses *m, const vec bound[2], const vec b[2], vec l
         const int i = side >> 1, k = 1 - i;
         vec x[2];
         x[i] = side & 1 ? bound[i] : zero;
-        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + m->w12 * x[i]) * m->mn[k]));
-        const vec slope = b[i] + m->w[i] * x[i] + m->w12 * x[k];
-        const vec value = x[0] * (half * (m->w[0] * x[0] + m->w12 * x[1]) + b[0]) +
-                          x[1] * (half * (m->w12 * x[0] + m->w[1] * x[1]) + b[1]);
+        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
+        const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
+        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) +
+                          x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
         const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless),
                    take = open & (right | (value < least));
         l[0] = bt_choose(take, x[0], l[0]);
@@ -81,48 +81,27 @@ BT_INLINE void bound_normals(const bt_batch *o, const vec bound[2], const motion
     vec b[2], l[2] = {*l1, *l2};
     for (int i = 0; i < 2; i++)
         b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
-    const bt_masses m = {.w = {o->w[0], o->w[1]}, .w12 = o->w12, .mn = {o->mn[0], o->mn[1]}};
-    rim(&m, bound, b, l);
+    rim(o, bound, b, l);
     *l1 = bt_choose(over, l[0], *l1);
     *l2 = bt_choose(over, l[1], *l2);
-}
-
-/// As bt_onto_sheets.
-BT_INLINE void onto_sheets(const bt_batch *o, vec friction, vec *x, vec *y)
-{
-    const vec zero = {0}, one[2] = {{1, 1, 1, 1}, {1, 1, 1, 1}};
-    const vec e[2][2] = {{o->BT_LOSS_1_X, o->BT_LOSS_1_Y}, {o->BT_LOSS_2_X, o->BT_LOSS_2_Y}};
-    bt_masses g = {.w = {e[0][0] * e[0][0] + e[0][1] * e[0][1], e[1][0] * e[1][0] + e[1][1] * e[1][1]},
-                   .w12 = e[0][0] * e[1][0] + e[0][1] * e[1][1]};
-    for (int i = 0; i < 2; i++) g.mn[i] = bt_choose(g.w[i] > zero, one[i] / g.w[i], zero);
-    const vec det = g.w[0] * g.w[1] - g.w12 * g.w12;
-    g.per_det = bt_choose(det > 1e-9 * g.w[0] * g.w[1], one[0] / det, zero);
-    const vec b[2] = {-(e[0][0] * *x + e[0][1] * *y), -(e[1][0] * *x + e[1][1] * *y)};
-    vec part[2] = {(g.w12 * b[1] - g.w[1] * b[0]) * g.per_det, (g.w12 * b[0] - g.w[0] * b[1]) * g.per_det};
-    const mask inside = (g.per_det > zero) & (part[0] >= zero) & (part[1] >= zero) & (part[0] <= one[0]) &
-                        (part[1] <= one[1]);
-    if (any_of(~inside)) {
-        vec l[2] = {part[0], part[1]};
-        rim(&g, one, b, l);
-        for (int i = 0; i < 2; i++) part[i] = bt_choose(inside, part[i], l[i]);
-    }
-    const vec near_x = part[0] * e[0][0] + part[1] * e[1][0], near_y = part[0] * e[0][1] + part[1] * e[1][1];
-    const vec dx = *x - near_x, dy = *y - near_y, square = dx * dx + dy * dy;
-    vec far = zero;
-    for (int l = 0; l < BT_LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
-    const mask outside = far > friction;
-    *x = bt_choose(outside, near_x + dx * (friction / far), *x);
-    *y = bt_choose(outside, near_y + dy * (friction / far), *y);
 }
 
 /// As bt_update_sheets; lanes without a contact bear nothing and have no step.
 BT_INLINE vec update_sheets(bt_batch *o, vec friction, bt_vel *v)
 {
+    const vec zero = {0}, one = {1, 1, 1, 1};
     motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
     const vec dvx = b.x - a.x, dvy = b.y - a.y;
     vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
-    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt;
-    onto_sheets(o, friction, &x, &y);
+    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
+    const vec ends = o->BT_ENDS_X * o->BT_ENDS_X + o->BT_ENDS_Y * o->BT_ENDS_Y;
+    const vec along = (x * o->BT_ENDS_X + y * o->BT_ENDS_Y) / ends;
+    const vec part = bt_choose(ends > zero, bt_larger(-one, bt_smaller(one, along)), zero);
+    const vec out_x = x - part * o->BT_ENDS_X, out_y = y - part * o->BT_ENDS_Y, square = out_x * out_x + out_y * out_y;
+    for (int l = 0; l < BT_LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
+    const mask outside = far > friction;
+    x = bt_choose(outside, part * o->BT_ENDS_X + out_x * (friction / far), x);
+    y = bt_choose(outside, part * o->BT_ENDS_Y + out_y * (friction / far), y);
     const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
     a.x -= o->ma * jx;
     a.y -= o->ma * jy;

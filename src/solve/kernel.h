@@ -51,24 +51,17 @@ static inline double bt_take_normals(bt_contact *u, const bt_mass *m, double l1,
     return bt_max(bt_max(fabs(u1), fabs(u2)), fabs(dt) * m->wt);
 }
 
-/// The nearest load that sheets can bear (contact/raft.h): the nearest point of the parallelogram of their losses, which
-/// is the problem of two normal impulses under bounds with e_i · e_j for W, and as far from it as friction reaches.
+/// The nearest load that sheets can bear (contact/raft.h): as much of `ends` as there is, to one side or the other, and
+/// as far from it as friction reaches.
 static inline void bt_onto_sheets(const bt_limit *k, double *x, double *y)
 {
-    const double (*e)[2] = k->loss, one[2] = {1, 1};
-    bt_mass g = {.w = {e[0][0] * e[0][0] + e[0][1] * e[0][1], e[1][0] * e[1][0] + e[1][1] * e[1][1]},
-                 .w12 = e[0][0] * e[1][0] + e[0][1] * e[1][1]};
-    for (int i = 0; i < 2; i++) g.mn[i] = g.w[i] > 0 ? 1 / g.w[i] : 0;
-    const double det = g.w[0] * g.w[1] - g.w12 * g.w12;
-    g.per_det = det > 1e-9 * g.w[0] * g.w[1] ? 1 / det : 0;
-    const double b[2] = {-(e[0][0] * *x + e[0][1] * *y), -(e[1][0] * *x + e[1][1] * *y)};
-    double part[2];
-    if (!bt_limit_inside(&g, b, one, part)) bt_limit_rim(&g, b, one, part);
-    const double near_x = part[0] * e[0][0] + part[1] * e[1][0], near_y = part[0] * e[0][1] + part[1] * e[1][1];
-    const double dx = *x - near_x, dy = *y - near_y, far = sqrt(dx * dx + dy * dy), radius = k->flat[0];
+    const double *e = k->ends, square = e[0] * e[0] + e[1] * e[1];
+    const double part = square > 0 ? bt_clamp((*x * e[0] + *y * e[1]) / square, 1) : 0;
+    const double dx = *x - part * e[0], dy = *y - part * e[1];
+    const double far = sqrt(dx * dx + dy * dy), radius = k->flat[0];
     if (!(far > radius)) return;
-    *x = near_x + dx * (radius / far);
-    *y = near_y + dy * (radius / far);
+    *x = part * e[0] + dx * (radius / far);
+    *y = part * e[1] + dy * (radius / far);
 }
 
 /// What the load of sheets would be after a step of its own (contact/raft.h).
@@ -121,8 +114,8 @@ static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const 
 /// (a short step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position
 /// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts. The impulse of
 /// sheets has a direction, too, which where it is small turns with the last digits of the slip: to ask for it to 1 % took
-/// 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power D of
-/// contact/raft.h that the impulse does not take.
+/// 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power that the
+/// impulse does not take.
 static inline double bt_short_residual(double closing, double part, double tolerance)
 {
     return bt_min(closing, part * (tolerance / BT_SHORT));
@@ -134,14 +127,10 @@ static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, c
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double x, y;
     bt_sheets_map(u, m, k, va, vb, &x, &y);
-    const double dx = x - u->ln[0], dy = y - u->lt;
+    const double *e = k->ends, friction = k->flat[0], dx = x - u->ln[0], dy = y - u->lt;
     const double un = bt_normal_velocity(u, 0, va, vb), ut = bt_tangent_velocity(u, va, vb);
-    double bears = k->flat[0], takes = k->flat[0] * sqrt(un * un + ut * ut);
-    for (int i = 0; i < 2; i++) {
-        const double *e = k->loss[i];
-        bears += sqrt(e[0] * e[0] + e[1] * e[1]);
-        takes += bt_max(0, -(e[0] * un + e[1] * ut));
-    }
+    const double bears = friction + sqrt(e[0] * e[0] + e[1] * e[1]),
+                 takes = friction * sqrt(un * un + ut * ut) + fabs(e[0] * un + e[1] * ut);
     x = dx * m->wt, y = dy * m->wt;
     double lacks = 0;
     if (takes > 0) {

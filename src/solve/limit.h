@@ -39,14 +39,6 @@ static inline double bt_limit_bound(const bt_limit *l, const bt_contact *u, int 
     return bt_min(l->most[i], bt_max(l->flat[i], rising));
 }
 
-/// Where W λ + b = 0; is it in the box 0 <= λ <= c?
-static inline bool bt_limit_inside(const bt_mass *m, const double b[2], const double c[2], double l[2])
-{
-    l[0] = (m->w12 * b[1] - m->w[1] * b[0]) * m->per_det;
-    l[1] = (m->w12 * b[0] - m->w[0] * b[1]) * m->per_det;
-    return m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= c[0] && l[1] <= c[1];
-}
-
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
 /// multiplier has the right sign, and of sides that rounding leaves in doubt the one of least value.
 static inline void bt_limit_rim(const bt_mass *m, const double b[2], const double c[2], double l[2])
@@ -73,7 +65,9 @@ static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const bt
                                 double l[2])
 {
     enum { TURNS = 4 };
-    if (bt_limit_inside(m, b, k->flat, l)) return;
+    l[0] = (m->w12 * b[1] - m->w[1] * b[0]) * m->per_det;
+    l[1] = (m->w12 * b[0] - m->w[0] * b[1]) * m->per_det;
+    if (m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
     const bt_rise *r = bt_rise_of(k);
     if (r->slope[0] == 0 && r->slope[1] == 0 && !(r->hit[0].before > 0 || r->hit[1].before > 0)) {
         bt_limit_rim(m, b, k->flat, l);

@@ -3,11 +3,10 @@
 
     u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound
     |r_t| <= μ r_n against u_t
-    sheets on each other: (r_x, r_y) = α e_1 + β e_2 + d, 0 <= α, β <= 1, |d| <= R, the largest power against (u_x, u_y)
+    sheets on each other: (r_x, r_y) = α e + d, |α| <= 1, |d| <= R, the largest power against (u_x, u_y)
 
 For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of
-such problems. Floes that have rafted have no friction bound: without walls a problem of them alone is convex as it
-stands. Then the rows that hold, and those that give way, are known, and what is left is a system of equations,
+such problems. Then the rows that hold, and those that give way, are known, and what is left is a system of equations,
 solved by Newton's method to the last digits.
 """
 import h5py
@@ -29,19 +28,19 @@ CLUSTER = {
 
 
 class Rafting(Problem):
-    """z: impulses r, but that of sheets only by their disc, and then what they have along their sides."""
+    """z: impulses r, but that of sheets only by their disc, and then what the ends of their overlaps have."""
 
     def __init__(self, path):
         super().__init__(path)
         with h5py.File(path) as f:
-            self.disc, loss = f["disc"][:], f["loss"][:].reshape(-1, 2, 2)
+            self.disc, ends = f["disc"][:], f["ends"][:].reshape(-1, 2)
         self.sheets = np.isfinite(self.disc)
-        size = np.hypot(*np.moveaxis(loss, -1, 0))
-        self.side = [(k, i) for k, i in np.argwhere(size > 0)]
-        self.longest = np.array([size[k, i] for k, i in self.side])
-        self.of_z = np.hstack([np.eye(2 * self.n), np.zeros((2 * self.n, len(self.side)))])  # r = of_z z
-        for column, (k, i) in enumerate(self.side, 2 * self.n):
-            self.of_z[[2 * k, 2 * k + 1], column] = loss[k, i] / size[k, i]
+        self.with_ends = np.flatnonzero(np.hypot(*ends.T) > 0)
+        self.ends = ends[self.with_ends]
+        self.longest = np.hypot(*self.ends.T)
+        self.of_z = np.hstack([np.eye(2 * self.n), np.zeros((2 * self.n, len(self.ends)))])  # r = of_z z
+        for column, k in enumerate(self.with_ends, 2 * self.n):
+            self.of_z[[2 * k, 2 * k + 1], column] = self.ends[column - 2 * self.n] / self.longest[column - 2 * self.n]
 
 
 def dump(folder, seed):
@@ -99,7 +98,7 @@ def interior_point(W, q, low, high, discs, radius):
 
 
 def from_scratch(p):
-    """z of the problem, of which nothing but W, q, μ, bounds, discs and sides is looked at; approximate."""
+    """z of the problem, of which nothing but W, q, μ, bounds, discs and ends is looked at; approximate."""
     W, q = p.of_z.T @ p.W @ p.of_z, p.of_z.T @ p.q
     scale = 1 / np.sqrt(np.diag(W))
     rows = np.arange(2 * p.n).reshape(-1, 2)
@@ -115,6 +114,7 @@ def from_scratch(p):
         high[1:2 * p.n:2] = np.where(p.sheets, np.inf, np.maximum(p.mu * normal / scale[1:2 * p.n:2] / unit, 1e-9))
         low[1:2 * p.n:2] = -high[1:2 * p.n:2]
         high[2 * p.n:] = p.longest / scale[2 * p.n:] / unit
+        low[2 * p.n:] = -high[2 * p.n:]
         z = scale * unit * interior_point(W, q, low, high, discs, radius)
         normal = np.where(p.sheets, 0, np.maximum(z[:2 * p.n:2], 0))
         change = np.abs(p.W @ p.of_z @ (z - before)).max() if np.all(np.isfinite(before)) else np.inf
@@ -131,10 +131,10 @@ def polish(p, x):
     u = W @ x + q
     small = 2e-5 * SPEED
 
-    def bounded(E, J, i, z, v, bound):
+    def bounded(E, J, i, z, v, least, bound):
         w = W[i, i]
-        if u[i] > small or x[i] * w < small:                                     # open
-            E[i], J[i, i] = z[i] * w, w
+        if u[i] > small or x[i] - least < small / w:                             # open, or gives way to the other side
+            E[i], J[i, i] = (z[i] - least) * w, w
         elif u[i] < -small or bound - x[i] < small / w:                          # gives way
             E[i], J[i, i] = (z[i] - bound) * w, w
         else:
@@ -143,7 +143,7 @@ def polish(p, x):
     def equations(z):
         v, E, J = W @ z + q, np.zeros(m), np.zeros((m, m))
         for i in range(2 * p.n, m):
-            bounded(E, J, i, z, v, p.longest[i - 2 * p.n])
+            bounded(E, J, i, z, v, -p.longest[i - 2 * p.n], p.longest[i - 2 * p.n])
         for k in range(p.n):
             i, j = 2 * k, 2 * k + 1
             if p.sheets[k]:
@@ -158,7 +158,7 @@ def polish(p, x):
                     J[j, i] += v[j] / p.disc[k]
                     J[j, j] -= v[i] / p.disc[k]
                 continue
-            bounded(E, J, i, z, v, p.bound[k])
+            bounded(E, J, i, z, v, 0, p.bound[k])
             if abs(u[j]) < small and abs(x[j]) * W[j, j] < p.mu[k] * x[i] * W[j, j] - small:
                 E[j], J[j] = v[j], W[j]
             else:
@@ -181,14 +181,13 @@ def test_impulses_of_a_cluster(tmp_path, seed):
     rows = np.arange(2 * p.n).reshape(-1, 2)[p.sheets]
     r, u = p.r[rows], p.u[rows]
     directions = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 721)])
-    sides = np.zeros((p.n, 2, 2))
-    for column, (k, i) in enumerate(p.side):
-        sides[k, i] = p.longest[column] * p.of_z[[2 * k, 2 * k + 1], 2 * p.n + column]
+    ends = np.zeros((p.n, 2))
+    ends[p.with_ends] = p.ends
 
     def reach(e):  # of each pair of sheets along e [sheets, 2]
-        return np.maximum(0, np.einsum("kic,kc->ki", sides[p.sheets], e)).sum(axis=1) + p.disc[p.sheets] * np.hypot(*e.T)
+        return np.abs((ends[p.sheets] * e).sum(axis=1)) + p.disc[p.sheets] * np.hypot(*e.T)
 
-    assert len(p.side) >= 4 and p.sheets.sum() >= 3
+    assert len(p.ends) >= 2 and p.sheets.sum() >= 3
     for e in directions:
         assert np.all(r @ e <= reach(np.tile(e, (len(r), 1))) * (1 + 1e-12))
     slides = np.hypot(*u.T) > 1e-6 * SPEED
@@ -203,7 +202,9 @@ def test_impulses_of_a_cluster(tmp_path, seed):
     assert np.abs(p.W @ r + p.q - p.u).max() < 1e-8 * SPEED
     # Impulses between walls may be shared out in several ways; those that follow from a velocity are unique.
     unique = np.zeros((p.n, 2), bool)
-    unique[np.flatnonzero(p.sheets)[slides]] = True
+    # ends that do not slide may share a load with the friction of their edge
+    across = np.abs((ends[p.sheets] * u).sum(axis=1)) > 1e-6 * SPEED * np.hypot(*ends[p.sheets].T)
+    unique[np.flatnonzero(p.sheets)[slides & (across | (np.hypot(*ends[p.sheets].T) == 0))]] = True
     unique[at_bound, 0] = True
     assert np.abs(((r - p.r) * np.diag(p.W))[unique.ravel()]).max() < 1e-8 * SPEED
 
@@ -229,9 +230,9 @@ def thrown(seed):
     }
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 7, 8, 10, 11, 12])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 7, 8, 10, 11, 12])
 def test_impulses_without_walls(tmp_path, seed):
-    """Few enough contacts that all impulses are unique (with the seeds 6 and 9 they are not)."""
+    """Few enough contacts that all impulses are unique (with the seeds 5, 6 and 9 they are not)."""
     case = thrown(seed)
     rafting, friction = run(tmp_path, case, "--steps", 60, name="scan").series("rafting", "raft_friction_work")
     step = int(np.argmax((rafting >= 2) & (friction > 0))) + 2

@@ -466,10 +466,10 @@ static void sides_that_lie_on_each_other_do_not_push(void **state)
             add_box(w, BT_DYNAMIC, length, length, 0, 0, h);
             add_box(w, BT_DYNAMIC, length, length, length - overlap, aside, h);
             bt_overlap o;
-            double grad[2], turn;
+            double grad[2];
             const bt_idx a = bt_world_index(w, 0), b = bt_world_index(w, 1);
             bt_overlap_clip(w, a, b, (uint16_t[]){0, 0}, 0, 0, &o);
-            bt_overlap_gradient(w, a, b, (uint16_t[]){0, 0}, &o, blend, grad, &turn);
+            bt_overlap_gradient(w, a, b, (uint16_t[]){0, 0}, &o, blend, grad);
             CHECK_CLOSE(grad[0], -(length - fabs(aside)), 1e-9);
             CHECK_CLOSE(grad[1], half ? -side * 0.5 * overlap : 0, 1e-9);
             bt_world_free(w);
@@ -477,9 +477,9 @@ static void sides_that_lie_on_each_other_do_not_push(void **state)
 }
 
 /// Squares between two plates, out of line by turns; lateral guides are none. No pair bears less than q0 on the width
-/// lies on each other, with the friction of the sheets, until one of them is under by a fifteenth of its side
-/// or the row has gone on to a side by 2 % of that: such a row buckles, later with friction than without. Where the
-/// losses stood on the chord, as the stored part does, it slipped out: no load at no friction.
+/// lies on each other, with the friction of the sheets, until one of them is under by a fifteenth of its side.
+/// Without friction the row drifts on to a side, by 0.5 m at most in the minute that this takes. Without the ends of
+/// the overlap it slipped out: no load at no friction.
 static void a_row_out_of_line(void **state)
 {
     (void)state;
@@ -498,7 +498,7 @@ static void a_row_out_of_line(void **state)
         const bt_gid plate = add_box(w, BT_KINEMATIC, 2, 30, N * a + 0.001 * N + 1, 0, 0);
         set_speed(w, plate, -v);
         double deepest = 0, least = INFINITY, most = 0, drift = 0;
-        while (deepest < a / 15 && drift < 0.02 * a) {
+        while (deepest < a / 15) {
             bt_world_step(w);
             assert_true(w->stats.converged);
             deepest = 0;
@@ -513,22 +513,21 @@ static void a_row_out_of_line(void **state)
             const double part = load_on(w, plate) / weakest;
             least = bt_min(least, part), most = bt_max(most, part);
         }
-        print_message("kappa %d, friction %g, %g m out of line: %.4f to %.4f until %.2f m under and %.2f m on\n",
-                      i & 2 ? 10 : 4, friction, aside, least, most, deepest, drift);
-        assert_true(least > 0.99 && most < 1.01);
-        assert_true(deepest > (friction > 0 ? a / 40 : a / 110));
+        print_message("kappa %d, friction %g, %g m out of line: %.4f to %.4f drift %.2f m\n",
+                      i & 2 ? 10 : 4, friction, aside, least, most, drift);
+        assert_true(least > 0.99 && most < 1.04);
+        assert_true(drift < (friction > 0 ? 0.2 : 0.55));
         bt_world_free(w);
     }
 }
 
-/// What it costs to cover an area is q0 at an angle to the edge, too. Sliding along the edge costs the losses of half the
-/// width that is under, for each length, the way back nothing; whatever friction there is between sheets besides. The
-/// floe is so heavy that nothing stops it.
+/// What it costs to cover an area, without friction: q0 where the area of the overlap grows, whatever the angle to the
+/// edge, and q0 times half the width that is under for each length along the edge. The way back costs nothing. The floe
+/// is so heavy that nothing stops it.
 static void the_cost_of_an_angle(void **state)
 {
     (void)state;
-    const double a = 10, v = 0.05, stored = rise() * h * h;
-    const double angle[] = {0, 15, 30, 45, 90, 120, 180};
+    const double a = 10, v = 0.05, angle[] = {0, 15, 30, 45, 90, 120, 180};
     for (int i = 0; i < 7; i++) {
         bt_params p = params(0.1);
         bt_world *w = bt_world_create(&p);
@@ -536,26 +535,25 @@ static void the_cost_of_an_angle(void **state)
         double outline[8];
         scene_square(a, outline);
         bt_body_def d = scene_prism(4, outline, 1e13);
-        d.x = 0.5 * a + 0.001, d.thickness = h, d.friction = i % 2 ? mu : 0;
+        d.x = 0.5 * a + 0.001, d.thickness = h, d.friction = 0;
         const bt_gid floe = bt_world_add(w, &d);
         set_speed(w, floe, -v);
         for (int k = 0; k < 2 * a / v; k++) bt_world_step(w); // a fifth of it is under
         CHECK_CLOSE(pose(w, floe)->x, 0.3 * a, 0.01);
         const double c = cos(angle[i] * M_PI / 180), s = sin(angle[i] * M_PI / 180);
         *vel(w, floe) = (bt_vel){-v * c, v * s, 0, 0};
-        double work = 0, all = 0, want = 0, way = 0, from = pose(w, floe)->x;
+        double work = 0, want = 0, way = 0, from = pose(w, floe)->x;
         for (int k = 0; k < 50; k++) {
-            const double under = 0.5 * a - pose(w, floe)->x, aside = 0.5 * (edge_load() - stored) * under * s,
-                         ahead = 0.5 * (edge_load() - stored) * a * c;
+            const double under = 0.5 * a - pose(w, floe)->x;
             bt_world_step(w);
             work += scene_law(w, "raft_edge_work"), way += v * p.dt;
-            want += v * p.dt * (bt_max(0, stored * a * c) + bt_max(0, ahead + aside) + bt_max(0, ahead - aside));
-            all = scene_law(w, "raft_edge_work") + scene_law(w, "raft_friction_work");
-            CHECK_CLOSE(all, -w->stats.contact_work, 1e-9 * edge_load() * a * v * p.dt); // no other friction
+            want += v * p.dt * edge_load() * (a * bt_max(0, c) + 0.5 * under * s);
+            assert_true(fabs(scene_law(w, "raft_friction_work")) <= 1e-9 * edge_load() * a * v * p.dt);
+            CHECK_CLOSE(scene_law(w, "raft_edge_work"), -w->stats.contact_work, 1e-9 * edge_load() * a * v * p.dt);
             if (c < 0 && pose(w, floe)->x < from + 2 * p.slop) work = want = way = 0; // it is free from a slop on
+            if (c < 0) want = 0;
         }
         CHECK_CLOSE(work / way, want / way, 1e-8 * edge_load() * a);
-        if (angle[i] < 50) CHECK_CLOSE(work / (way * a * c), edge_load(), 1e-8 * edge_load());
         bt_world_free(w);
     }
 }

@@ -74,10 +74,8 @@ static void bind(knot_of_floes *s, uint64_t *rng)
         if (scene_uniform(rng) < 0.35) {
             make_sheets(&s->contacts[i], rng);
             l->flat[0] = scene_uniform(rng) < 0.1 ? 0 : scene_uniform(rng);
-            memset(l->loss, 0, sizeof l->loss);
-            if (scene_uniform(rng) < 0.7) // some with sides that are parallel
-                for (int c = 0; c < 4; c++) l->loss[c / 2][c % 2] = 0.6 * any(rng);
-            if (scene_uniform(rng) < 0.2) l->loss[1][0] = 2 * l->loss[0][0], l->loss[1][1] = 2 * l->loss[0][1];
+            if (scene_uniform(rng) < 0.7)
+                for (int c = 0; c < 2; c++) l->ends[c] = 0.6 * any(rng);
         } else if (scene_uniform(rng) < 0.8) {
             for (int c = 0; c < s->contacts[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
         }
