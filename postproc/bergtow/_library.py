@@ -179,7 +179,7 @@ def load() -> tuple[Library, str]:
     # Threads that spin at a barrier make a busy machine many times slower (src/app/main.c); libgomp reads this when it
     # is loaded, and what the user has set wins.
     if "OMP_WAIT_POLICY" not in os.environ:
-        os.environ.setdefault("GOMP_SPINCOUNT", "5000")
+        os.environ.setdefault("GOMP_SPINCOUNT", "20000")
     # UCX, which the Open MPI of Debian 13 loads, takes SIGHUP for its debugger, also from nohup.
     os.environ.setdefault("UCX_DEBUG_SIGNO", "0")
     reasons = []

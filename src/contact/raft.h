@@ -18,39 +18,39 @@
 //     grad = ∂A/∂(displacement of b),   L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L
 //     gap = (A* − A)/L,   0 <= λ <= q0 L Δt,   w < −gap/Δt only where λ is at its bound
 // A*: the largest area so far; below it the edge bears nothing: what was stored counts as lost when sheets slide back.
-// For two outlines that cross twice, L is the chord between the crossings and n is square to it. Two points on the line
-// along the chord through the centroid of the overlap, L/4 from it, take half of the bound each. There lies the
-// resultant of losses over the whole overlap, which turns a floe back that goes under askew. Rejected: the middle of the
-// chord, where the gradient has its moment. A row of squares out of line turned and buckled sooner (0.94 of its load
-// where one pair was under by 1/50, and 1 with the centroid). L is that of the start of the step: first order in Δt, as
-// the area itself. No edge is shorter than h (assumed). Along the edge there is Coulomb friction, as before it rafts.
-// Of the losses below A*, (q0 − E') L Δt, the part
+// For two outlines that cross twice, L is the chord between the crossings and n is square to it. Two points on the
+// line along the chord through the centroid of the overlap, L/4 from it, take half of the bound each. There lies the
+// resultant of losses over the whole overlap, which turns a floe back that goes under askew. Rejected: the middle of
+// the chord, where the gradient has its moment. A row of squares out of line turned and buckled sooner (0.94 of its
+// load where one pair was under by 1/50, and 1 with the centroid). L is that of the start of the step: first order in
+// Δt, as the area itself. No edge is shorter than h (assumed). Along the edge there is Coulomb friction, as before it
+// rafts. Of the losses below A*, (q0 − E') L Δt, the part
 //     max(0, 1 − gap/(Δt c + slop))
 // is in the bound, with c the approach of the edge by the velocities without contacts. So a gap that is crossed in a
 // step of any length takes the losses of what goes under beyond it, and none where it is not crossed but for a slop: a
-// cut there would let go of an edge that bears load whenever a residual opens it, and sheets would creep. Rejected: all
-// of them in a step in which the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work for the
-// same area).
+// cut there would let go of an edge that bears load whenever a residual opens it, and sheets would creep. Rejected:
+// all of them in a step in which the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work
+// for the same area).
 //
 // Ends. An edge inside the other floe that advances covers fresh ice. Half of each such edge is a push f_k, square to
 // it, from a to b: Σ f_k = L n, and the area that is newly covered, the mean of that of both floes, grows at the rate
-// Σ max(0, −f_k · u), with u the velocity of b against a at the centroid of the overlap. Along the chord it grows although
-// A does not, by s L a length, where s L is the sum of the pushes' parts along t, square to n, that are above 0: half
-// the width of the overlap. What is stored there is lost at the other end, so that this costs q0 an area. The ends of the
-// overlap bear
+// Σ max(0, −f_k · u), with u the velocity of b against a at the centroid of the overlap. Along the chord it grows
+// although A does not, by s L a length, where s L is the sum of the pushes' parts along t, square to n, that are above
+// 0: half the width of the overlap. What is stored there is lost at the other end, so that this costs q0 an area. The
+// ends of the overlap bear
 //     |λ_t| <= q0 s L Δt   against t · u
 // times the same part below A*. They hold a row of squares in line, which the edge pushes aside with the tilt of its
 // chord: of two that are under by d, s L is d cos² α, with tan α = d/a, and the edge pushes with q0 d. Going under in
-// line, such squares pay 1 + sin² α times q0 for an area. s is kept below 1/2, as corners of squares have it; otherwise a
-// floe that is all but under another one would go on paying.
-// Rejected: no ends. A row of squares that is 1 cm out of line slips out, without a load where there is no friction.
-// Losses as a disc about ½ R n of radius ½ R, R = (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R along
-// their edge however little lies on each other, which welds them together: the mean of a berg model in a basin with 80 %
-// ice was 19 N, for 16 N with rigid floes and 13 N with this law. Losses in the parallelogram of the pushes, times
-// (q0 − E')/L, beside the edge with E' alone. An area costs exactly q0 at any angle, but friction of the edge has no
-// place in it: the same mean was 7 N, and a row buckled at 1/100 of a side. A force against the motion with the same cost
-// for an area in every direction: at rest it may bear what it does not bear sliding along the edge, two solutions.
-// Without friction the law is associated: the power, Δt aside, is
+// line, such squares pay 1 + sin² α times q0 for an area. s is kept below 1/2, as corners of squares have it;
+// otherwise a floe that is all but under another one would go on paying. Rejected: no ends. A row of squares that is 1
+// cm out of line slips out, without a load where there is no friction. Losses as a disc about ½ R n of radius ½ R, R =
+// (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R along their edge however little lies on each other,
+// which welds them together: the mean of a berg model in a basin with 80 % ice was 19 N, for 16 N with rigid floes and
+// 13 N with this law. Losses in the parallelogram of the pushes, times (q0 − E')/L, beside the edge with E' alone. An
+// area costs exactly q0 at any angle, but friction of the edge has no place in it: the same mean was 7 N, and a row
+// buckled at 1/100 of a side. A force against the motion with the same cost for an area in every direction: at rest it
+// may bear what it does not bear sliding along the edge, two solutions. Without friction the law is associated: the
+// power, Δt aside, is
 //     q0 L max(0, −n · u) + q0 s L |t · u| + R_s |u|
 // (R_s below), which is convex, so that velocities are the one minimum of a convex function. With Coulomb friction
 // existence and uniqueness are as for all contacts; a cold start finds the velocities of a warm one.
@@ -67,8 +67,8 @@
 // overlap, friction of at most
 //     R_s = μ (ρ_w − ρ_i) g h A Δt
 // acts against sliding at the centroid of the overlap. With the ends it is a contact of its own without contact points
-// (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, R_s in flat[0] of its bounds and q0 s L Δt t
-// in `ends`. Its update is one step of
+// (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, R_s in flat[0] of its bounds and q0 s L
+// Δt t in `ends`. Its update is one step of
 //     λ <- proj(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
 // which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, for
 // which the records and batches of all rigid ice would grow.

@@ -113,8 +113,8 @@ static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const 
 /// that it leaves. The natural map is at most bound × W there, whatever the speed. Where that is below the tolerance
 /// (a short step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position
 /// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts. The impulse of
-/// sheets has a direction, too, which where it is small turns with the last digits of the slip: to ask for it to 1 % took
-/// 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power that the
+/// sheets has a direction, too, which where it is small turns with the last digits of the slip: to ask for it to 1 %
+/// took 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power that the
 /// impulse does not take.
 static inline double bt_short_residual(double closing, double part, double tolerance)
 {
