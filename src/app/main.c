@@ -115,12 +115,12 @@ static void before_libraries(void)
 __attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = before_libraries;
 
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
-// cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some tenths
-// of a millisecond, then sleep. Serial parts of a step must end within that: with 5,000 turns in place of 20,000 two
-// threads took 1.27 and 1.16 times as long for a tow through 80 and 90 % ice. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where
-// the system gives them, and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C
-// library read their settings before main, hence the second start; the user's own win. Loading the libraries again
-// takes 50 ms, which commands without a time step are spared.
+// cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
+// tenths of a millisecond, then sleep. Serial parts of a step must end within that: with 5,000 turns in place of
+// 20,000 two threads took 1.27 and 1.16 times as long for a tow through 80 and 90 % ice. And sweeps over memory miss
+// the address cache with pages of 4 kB: with large ones, where the system gives them, and the fetching ahead that they
+// allow, 300,000 floes took 20 % less. libgomp and the C library read their settings before main, hence the second
+// start; the user's own win. Loading the libraries again takes 50 ms, which commands without a time step are spared.
 static void start_with_settings(int argc, char **argv)
 {
     const int command = argc > 1 ? command_of(argv[1]) : -1;
