@@ -46,7 +46,7 @@
 // cm out of line slips out, without a load where there is no friction. Losses as a disc about ½ R n of radius ½ R, R =
 // (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R along their edge however little lies on each other,
 // which welds them together: the mean of a berg model in a basin with 80 % ice was 19 N, for 16 N with rigid floes and
-// 13 N with this law. Losses in the parallelogram of the pushes, times (q0 − E')/L, beside the edge with E' alone. An
+// 12 N with this law. Losses in the parallelogram of the pushes, times (q0 − E')/L, beside the edge with E' alone. An
 // area costs exactly q0 at any angle, but friction of the edge has no place in it: the same mean was 7 N, and a row
 // buckled at 1/100 of a side. A force against the motion with the same cost for an area in every direction: at rest it
 // may bear what it does not bear sliding along the edge, two solutions. Without friction the law is associated: the
