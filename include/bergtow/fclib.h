@@ -34,9 +34,9 @@ typedef struct bt_fclib_problem {
     const double *u, *r;   ///< [2n] solution, or both NULL
     // What the format does not know, stored beside it as /bound, /disc, /ends and /places; each may be NULL.
     const double *bound;   ///< [n] N s, 0 <= r_n <= bound; u_n < 0 where it holds
-    /// [n] N s, radius of the disc of which both components of a contact have a point; NaN: no such contact
-    const double *disc;
-    const double *ends;    ///< [2n] N s, and one of the line from −ends to ends; NULL: 0 of all
+    // Sheets: their impulse is the sum of a point of a disc about 0 and of a point of the line from −ends to ends.
+    const double *disc;    ///< [n] N s, radius of the disc; NaN: no sheets
+    const double *ends;    ///< [2n] N s; NULL: 0 of all
     const bt_fclib_places *places;
     const char *title, *description; ///< free text, or NULL
 } bt_fclib_problem;

@@ -156,7 +156,7 @@ static void edge_of(const double grad[2], double length, double gap, const doubl
 }
 
 /// s of raft.h: of a push that goes along the edge by less than the blend, a part.
-static double part_of_ends(const bt_overlap *o, const bt_manifold *edge, double length, double blend)
+static double length_of_ends(const bt_overlap *o, const bt_manifold *edge, double length, double blend)
 {
     double sum = 0;
     for (int k = 0; k < o->n; k++) {
@@ -166,7 +166,7 @@ static double part_of_ends(const bt_overlap *o, const bt_manifold *edge, double 
     return bt_min(0.5, sum / length);
 }
 
-/// False without an edge; `sheets` always, along the edge and s long in place of a normal.
+/// False without an edge. `sheets` always; it has a vector along the edge, s long, in place of its normal.
 static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
 {
     bt_overlap o;
@@ -182,7 +182,7 @@ static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_
     const double length = bt_hypot(grad[0], grad[1]);
     if (!(length > LEAST_LENGTH * thinner(&w->bodies, p->a, p->b))) return false;
     edge_of(grad, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
-    const double part = part_of_ends(&o, edge, length, least_blend(w));
+    const double part = length_of_ends(&o, edge, length, least_blend(w));
     sheets->nx = -part * edge->ny, sheets->ny = part * edge->nx;
     return true;
 }
@@ -204,8 +204,8 @@ static bt_patch flush_part(const bt_manifold *m)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-/// Part of the way that an edge would make in the step by the velocities without contacts which is left beyond its gap,
-/// with a slop on both.
+/// Of the way that an edge would make in the step by the velocities without contacts, the part beyond its gap; a slop
+/// is added to the way.
 static double reached(const bt_world *w, const bt_contact *edge, double gap)
 {
     const bt_bodies *s = &w->bodies;
@@ -269,9 +269,8 @@ static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
 static bt_contact ends_of(const bt_contact *sheets, const bt_limit *l)
 {
     bt_contact u = *sheets;
-    const double *e = l->ends, square = e[0] * e[0] + e[1] * e[1];
-    const double part = square > 0 ? bt_clamp((u.ln[0] * e[0] + u.lt * e[1]) / square, 1) : 0;
-    u.ln[0] = part * e[0], u.lt = part * e[1];
+    const double part = bt_part_of_ends(l->ends, u.ln[0], u.lt);
+    u.ln[0] = part * l->ends[0], u.lt = part * l->ends[1];
     return u;
 }
 

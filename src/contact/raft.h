@@ -24,13 +24,14 @@
 // the chord, where the gradient has its moment. A row of squares out of line turned and buckled sooner (0.94 of its
 // load where one pair was under by 1/50, and 1 with the centroid). L is that of the start of the step: first order in
 // Δt, as the area itself. No edge is shorter than h (assumed). Along the edge there is Coulomb friction, as before it
-// rafts. Of the losses below A*, (q0 − E') L Δt, the part
+// rafts.
+// Below A*, losses are not due. Of (q0 − E') L Δt the part
 //     max(0, 1 − gap/(Δt c + slop))
 // is in the bound, with c the approach of the edge by the velocities without contacts. So a gap that is crossed in a
 // step of any length takes the losses of what goes under beyond it, and none where it is not crossed but for a slop: a
-// cut there would let go of an edge that bears load whenever a residual opens it, and sheets would creep. Rejected:
-// all of them in a step in which the gap would be crossed (about a berg, in steps of 5 s, edges took 13 % more work
-// for the same area).
+// cut there would let go of an edge that bears load whenever a residual opens it, and sheets would creep.
+// Rejected: all of them in a step in which the gap would be crossed (about a berg, in steps of 5 s, edges took 13 %
+// more work for the same area).
 //
 // Ends. An edge inside the other floe that advances covers fresh ice. Half of each such edge is a push f_k, square to
 // it, from a to b: Σ f_k = L n, and the area that is newly covered, the mean of that of both floes, grows at the rate
@@ -42,15 +43,18 @@
 // times the same part below A*. They hold a row of squares in line, which the edge pushes aside with the tilt of its
 // chord: of two that are under by d, s L is d cos² α, with tan α = d/a, and the edge pushes with q0 d. Going under in
 // line, such squares pay 1 + sin² α times q0 for an area. s is kept below 1/2, as corners of squares have it;
-// otherwise a floe that is all but under another one would go on paying. Rejected: no ends. A row of squares that is 1
-// cm out of line slips out, without a load where there is no friction. Losses as a disc about ½ R n of radius ½ R, R =
-// (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R along their edge however little lies on each other,
-// which welds them together: the mean of a berg model in a basin with 80 % ice was 19 N, for 16 N with rigid floes and
-// 12 N with this law. Losses in the parallelogram of the pushes, times (q0 − E')/L, beside the edge with E' alone. An
-// area costs exactly q0 at any angle, but friction of the edge has no place in it: the same mean was 7 N, and a row
-// buckled at 1/100 of a side. A force against the motion with the same cost for an area in every direction: at rest it
-// may bear what it does not bear sliding along the edge, two solutions. Without friction the law is associated: the
-// power, Δt aside, is
+// otherwise a floe that is all but under another one would go on paying.
+// Rejected:
+// - No ends. A row of squares that is 1 cm out of line slips out, without a load where there is no friction.
+// - Losses as a disc about ½ R n of radius ½ R, R = (q0 − E') L Δt, and no friction of the edge. Sheets then pay ½ R
+//   along their edge however little lies on each other, which welds them together: the mean of a berg model in a basin
+//   with 80 % ice was 19 N, for 16 N with rigid floes and 12 N with this law.
+// - Losses in the parallelogram of the pushes, times (q0 − E')/L, beside an edge that bears E' alone. An area costs
+//   exactly q0 at any angle, but friction of the edge has no place in it: the same mean was 7 N, and a row buckled at
+//   1/100 of a side.
+// - A force against the motion with the same cost for an area in every direction. At rest it may bear what it does not
+//   bear when sheets slide along the edge: two solutions.
+// Without friction the law is associated. Its power, Δt aside, is
 //     q0 L max(0, −n · u) + q0 s L |t · u| + R_s |u|
 // (R_s below), which is convex, so that velocities are the one minimum of a convex function. With Coulomb friction
 // existence and uniqueness are as for all contacts; a cold start finds the velocities of a warm one.

@@ -89,6 +89,13 @@ static inline void bt_impulse_on_b(const bt_contact *u, double *x, double *y)
 
 static inline double bt_clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
 
+/// Part of the ends of an overlap, e (bt_limit.ends), that is nearest to the load (x, y) of sheets.
+static inline double bt_part_of_ends(const double e[2], double x, double y)
+{
+    const double square = e[0] * e[0] + e[1] * e[1];
+    return square > 0 ? bt_clamp((x * e[0] + y * e[1]) / square, 1) : 0;
+}
+
 /// Bodies of infinite mass are never written: they are shared by cells that are done at once.
 static inline void bt_store(bt_vel *v, bt_inv inv, const bt_vel *x)
 {

@@ -8,10 +8,9 @@
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /solution/{u, r}
-//     /bound, /disc, /ends, /places                of our own: bounds of the normal impulses; radius (NaN = another
-//                                                  contact) of a disc and half of a line of which points both
-//                                                  components of a contact are the sum (mu is 0); where contacts and
-//                                                  bodies are
+//     /bound, /disc, /ends, /places                of our own: bounds of the normal impulses; what sheets bear (mu is
+//                                                  0), a disc, of which this is the radius (NaN = another contact),
+//                                                  and a line, of which this is half; where contacts and bodies are
 #include "bergtow/fclib.h"
 
 #include <errno.h>
@@ -123,8 +122,8 @@ static void write_more(bt_h5 *h, const bt_fclib_problem *p)
         put(h, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
     if (p->disc)
         put(h, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
-            "both impulses are the sum of a point of the disc of this radius and one of the line from -ends to ends; "
-            "NaN: another contact");
+            "sheets: their impulse is the sum of a point of the disc of this radius and of a point of the line from "
+            "-ends to ends; NaN: another contact");
     if (p->ends) put_rows(h, "/ends", 2 * p->n, p->ends, "N s", "half of that line; 0 of other contacts");
     if (p->places) write_places(h, p->places, n);
     if (!p->r) return;

@@ -55,8 +55,7 @@ static inline double bt_take_normals(bt_contact *u, const bt_mass *m, double l1,
 /// as far from it as friction reaches.
 static inline void bt_onto_sheets(const bt_limit *k, double *x, double *y)
 {
-    const double *e = k->ends, square = e[0] * e[0] + e[1] * e[1];
-    const double part = square > 0 ? bt_clamp((*x * e[0] + *y * e[1]) / square, 1) : 0;
+    const double *e = k->ends, part = bt_part_of_ends(e, *x, *y);
     const double dx = *x - part * e[0], dy = *y - part * e[1];
     const double far = sqrt(dx * dx + dy * dy), radius = k->flat[0];
     if (!(far > radius)) return;
