@@ -2,7 +2,7 @@
 // Contact detection of one step: which cells are active, their margins, narrow phase, contacts with last step's
 // impulses.
 #include <math.h>
-#include <stdatomic.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -170,9 +170,11 @@ static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
     }
 }
 
-static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
+static void narrow_phase(bt_world *w, bt_idx k, const void *scratch, bt_totals *none)
 {
+    (void)none;
     const bt_bodies *b = &w->bodies;
+    thread_scratch *s = &(*(thread_scratch *const *)scratch)[omp_get_thread_num()];
     bt_cell *t = &w->cells->cell[k];
     if (t->laws.n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
@@ -218,17 +220,6 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     if (bt_laws_on(&w->par)) t->overlap = bt_laws_overlap(t); // what has given way does not count as overlap
 }
 
-/// A few of the cells after each other, until no more are left; one call a thread.
-static void detect_in(bt_world *w, const bt_idx *due, bt_idx n, _Atomic bt_idx *next)
-{
-    enum { AT_ONCE = 4 };
-    thread_scratch s = {0};
-    for (bt_idx i; (i = atomic_fetch_add(next, AT_ONCE)) < n;)
-        for (bt_idx j = i; j < i + AT_ONCE && j < n; j++) narrow_phase(w, due[j], &s);
-    bt_pair_scratch_free(&s.pairs);
-    bt_pack_scratch_free(&s.pack);
-}
-
 static void wake_body(bt_world *w, bt_idx i)
 {
     bt_cells *t = w->cells;
@@ -263,6 +254,7 @@ static void find_awake(bt_world *w)
 
 void bt_contacts_detect(bt_world *w, bool again)
 {
+    enum { FEW = 8 }; // a cell takes some ten microseconds
     bt_cells *t = w->cells;
     t->beside = bt_laws_on(&w->par) ? w->par.slop : 0; // contact/law.h, bt_closing
     bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
@@ -282,12 +274,14 @@ void bt_contacts_detect(bt_world *w, bool again)
         cell->margin = margin;
         due[n_due++] = k;
     }
-    _Atomic bt_idx next = 0;
-    if (!BT_MANY(n_due, BT_FEW_CELLS)) detect_in(w, due, n_due, &next);
-    else {
-#pragma omp parallel
-        detect_in(w, due, n_due, &next);
+    const int threads = omp_get_max_threads();
+    thread_scratch *scratch = bt_alloc((size_t)threads, sizeof *scratch);
+    bt_phases_listed(w, due, n_due, FEW, narrow_phase, &scratch, &(bt_totals){0});
+    for (int i = 0; i < threads; i++) {
+        bt_pair_scratch_free(&scratch[i].pairs);
+        bt_pack_scratch_free(&scratch[i].pack);
     }
+    free(scratch);
     free(due);
     const double t0 = bt_clock();
     bt_phases_order(w);

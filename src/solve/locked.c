@@ -95,8 +95,7 @@ static void push(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 static void form_change(bt_world *w, const loads *l)
 {
     bt_totals t = {0};
-    bt_phases_everywhere(w, no_change, NULL);
-    bt_phases_run(w, push, l, w->solver->shift, &t);
+    bt_phases_run(w, &(bt_before){no_change, NULL}, push, l, w->solver->shift, &t);
     bt_domain_settle(w, w->solver->shift);
 }
 
@@ -117,7 +116,7 @@ static void balance(bt_world *w, const loads *l)
     form_change(w, l);
     for (int sweep = 0; sweep < BT_LOCKED_SWEEPS; sweep++) {
         bt_totals t = {0};
-        bt_phases_run(w, relax, l, w->solver->shift, &t);
+        bt_phases_run(w, NULL, relax, l, w->solver->shift, &t);
         bt_domain_maxima(w, &t.most, 1);
         if (t.most <= BT_LOCKED_AT_REST * l->closing) break;
     }

@@ -7,28 +7,29 @@
 #include "solve/islands.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "space/cells.h"
+#include "space/phases.h"
 #include "partition/domain.h"
 #include "contact/work.h"
 #include "contact/pack.h"
 
+/// With the restitution of the bodies, whatever an earlier solution of this step has left of it.
+static void restore(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context;
+    const bt_cell *cell = &w->cells->cell[k];
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        t->most = bt_max(t->most, w->bodies.restitution[cell->contacts[j].b]);
+        bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);
+    }
+}
+
 bool bt_restitution_begin(bt_world *w)
 {
-    const bt_cells *ts = w->cells;
-    if (!ts->rebounds) return false;
-    double any = 0;
-    for (bt_idx i = 0; i < ts->n_order && any == 0; i++) {
-        const bt_cell *cell = &ts->cell[ts->order[i]];
-        for (bt_idx j = 0; j < cell->n_contacts && any == 0; j++)
-            any = w->bodies.restitution[cell->contacts[j].b] > 0;
-    }
-    bt_domain_maxima(w, &any, 1);
-    if (any == 0) return false;
-    // Contacts of an earlier detection in this step may still have the lowered restitution of its solution.
-    for (bt_idx i = 0; i < ts->n_order; i++) {
-        const bt_cell *cell = &ts->cell[ts->order[i]];
-        for (bt_idx j = 0; j < cell->n_contacts; j++) bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);
-    }
+    if (!w->cells->rebounds) return false;
+    bt_totals t = {0};
+    bt_phases_any_order(w, restore, NULL, &t);
+    bt_domain_maxima(w, &t.most, 1);
+    if (t.most == 0) return false;
     bt_islands_make(w, w->solver->islands, NULL);
     return true;
 }

@@ -241,12 +241,13 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
     move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
-/// Returns the largest update.
-static double sweep(bt_world *w, const bt_problem *p, bool moves, double beta, bt_work *work, double *against)
+/// Returns the largest update. `first` moves the bodies on.
+static double sweep(bt_world *w, const bt_problem *p, const bt_before *first, bool moves, double beta, bt_work *work,
+                    double *against)
 {
     bt_totals t = {.n_sums = BT_SWEEP_N};
     const bt_sweep s = {.problem = p, .moves = moves, .beta = beta};
-    bt_phases_run(w, p->sweep, &s, p->vel, &t);
+    bt_phases_run(w, first, p->sweep, &s, p->vel, &t);
     bt_domain_reduce(w, &t);
     work->sweeps++;
     work->updates += (int64_t)bt_sum_value(&t.sum[BT_SWEEP_UPDATES]);
@@ -258,7 +259,7 @@ static double sweep(bt_world *w, const bt_problem *p, bool moves, double beta, b
 double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work)
 {
     double against;
-    return sweep(w, p, false, 0, work, &against);
+    return sweep(w, p, NULL, false, 0, work, &against);
 }
 
 /// What counts against the limit.
@@ -273,8 +274,8 @@ typedef struct {
     double against; ///< of the last sweep
 } momentum;
 
-/// Move on from where the last sweep has come to.
-static void move_on(bt_world *w, const bt_problem *p, double cap, momentum *m)
+/// How far the next sweep moves on from where the last one has come to.
+static void gather(double cap, momentum *m)
 {
     if (!(m->against <= 0)) { // or not a number
         m->theta = 1, m->beta = 0;
@@ -283,7 +284,6 @@ static void move_on(bt_world *w, const bt_problem *p, double cap, momentum *m)
         m->beta = bt_min(cap, (m->theta - 1) / next);
         m->theta = next;
     }
-    bt_phases_everywhere(w, move_bodies, &(body_move){p->vel, w->solver->before, m->beta});
 }
 
 /// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
@@ -293,8 +293,10 @@ static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, 
     const double small = p->plain ? p->tolerance : BT_NEAR * p->tolerance;
     if (!on) *m = (momentum){.theta = 1};
     for (int n = 0;; n++) {
-        if (!p->plain && (n > 0 || on)) move_on(w, p, cap, m);
-        if (sweep(w, p, !p->plain, m->beta, work, &m->against) <= small) return true;
+        const bool moves_on = !p->plain && (n > 0 || on);
+        if (moves_on) gather(cap, m);
+        const bt_before move = {move_bodies, &(body_move){p->vel, w->solver->before, m->beta}};
+        if (sweep(w, p, moves_on ? &move : NULL, !p->plain, m->beta, work, &m->against) <= small) return true;
         if (n + 1 == length || spent(p, work) >= limit) return false;
     }
 }

@@ -170,9 +170,8 @@ static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_total
 /// impulse on this rank is not zero.
 static bool form_velocities(bt_world *w, bool warm)
 {
-    bt_phases_everywhere(w, free_velocities, NULL);
     bt_totals t = {0};
-    bt_phases_run(w, apply_impulses, &warm, w->bodies.vel, &t);
+    bt_phases_run(w, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, w->bodies.vel, &t);
     return t.most > 0;
 }
 

@@ -94,7 +94,7 @@ void bt_cells_free(bt_cells *t)
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
     void *arrays[] = {t->at,   t->speed,   t->bound, t->moved, t->asleep, t->awake,
-                      t->busy, t->is_busy, t->order, t->share, t->cell,   t};
+                      t->busy, t->is_busy, t->order, t->turn,  t->share,  t->cell,  t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -387,6 +387,9 @@ static void make_cells(bt_world *w)
     t->asleep = bt_realloc(t->asleep, n, sizeof *t->asleep);
     t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
     t->order = bt_realloc(t->order, n, sizeof *t->order);
+    free(t->turn);
+    t->turn = bt_alloc_aligned(n, sizeof *t->turn);
+    t->n_passes = 0;
     t->busy = bt_realloc(t->busy, n, sizeof *t->busy);
     t->is_busy = bt_realloc(t->is_busy, n, sizeof *t->is_busy);
     for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->asleep[k] = t->awake[k] = 0;

@@ -165,6 +165,13 @@ typedef struct bt_cell {
     bt_work_list work;
 } bt_cell;
 
+/// What a cell waits for in a pass, and what waits for it (src/space/phases.h).
+typedef struct bt_turn {
+    _Atomic uint32_t done;          ///< number of the last pass that has visited it
+    bt_idx n_before, before[8];     ///< cells around it that a pass visits first
+    char apart[64 - 10 * sizeof(bt_idx)]; ///< a cache line each
+} bt_turn;
+
 /// What one thread is to do of one stretch of the order (src/space/phases.h).
 typedef struct bt_share {
     _Atomic bt_idx next;            ///< the next cell to be taken, a place in the order
@@ -217,6 +224,8 @@ typedef struct bt_cells {
     bt_idx n_order;
     bt_idx start[BT_PHASES + 1];    ///< first cell of each phase in the order
     bt_idx n_border[BT_PHASES];     ///< cells at the border among those of each phase
+    bt_turn *turn;                  ///< [n]
+    uint32_t n_passes;              ///< passes in the order of the phases so far
     bt_share *share;                ///< [BT_STRETCHES][n_shares] at the border and not, of every phase
     bt_idx n_shares, cap_shares;    ///< threads
     bt_idx n_contacts;                 ///< on this rank

@@ -4,6 +4,7 @@
 #include "base/inside.h"
 
 #include <omp.h>
+#include <sched.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,6 +70,20 @@ static int stretch_of(const bt_world *w, bt_idx k)
     return 2 * cell->phase + !(w->exchange && cell->border);
 }
 
+/// List the cells around cell k that share bodies with it and are visited before it.
+static void find_before(const bt_world *w, bt_idx k)
+{
+    const bt_cells *t = w->cells;
+    const bt_cell *cell = &t->cell[k];
+    bt_turn *turn = &t->turn[k];
+    turn->n_before = 0;
+    for (int j = 0; j < 9 && k < t->n - 1; j++) {
+        const bt_idx o = bt_cells_at(t, cell->x + j % 3 - 1, cell->y + j / 3 - 1);
+        if (o < 0 || !t->is_busy[o] || !has_work(w, o) || t->cell[o].phase >= cell->phase) continue;
+        turn->before[turn->n_before++] = o;
+    }
+}
+
 void bt_phases_order(bt_world *w)
 {
     bt_cells *t = w->cells;
@@ -85,6 +100,7 @@ void bt_phases_order(bt_world *w)
         const bt_idx k = t->busy[j];
         if (!has_work(w, k)) continue;
         t->order[at[stretch_of(w, k)]++] = k;
+        find_before(w, k);
         t->n_contacts += t->cell[k].n_contacts;
         t->cell[k].work.n_list = t->cell[k].n_contacts; // until they are listed
     }
@@ -96,32 +112,62 @@ void bt_phases_order(bt_world *w)
 /// A pass, as each thread sees it.
 typedef struct pass {
     bt_world *w;
+    const bt_idx *list; ///< cells
+    bt_share *share;    ///< [n_stretches][n_shares] of the list
+    int n_stretches;
+    bt_idx n_shares;
+    const bt_before *before;
     bt_visit *visit;
     const void *context;
     bt_vel *exchanged;
+    uint32_t number; ///< of the pass; 0: in any order
     bt_idx me, team; ///< number of the thread, and how many there are
     bt_totals *own;  ///< what the thread adds up
 } pass;
 
-static void open_shares(bt_cells *t)
+/// A pass over the cells with work.
+static pass in_order(bt_world *w, bt_visit *visit, const void *context)
 {
-    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++)
-        atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
+    bt_cells *t = w->cells;
+    return (pass){.w = w,
+                  .list = t->order,
+                  .share = t->share,
+                  .n_stretches = BT_STRETCHES,
+                  .n_shares = t->n_shares,
+                  .visit = visit,
+                  .context = context,
+                  .team = 1};
 }
 
-/// Cells of one stretch of the order, which share no body: first those of this thread's share, then what others have
+/// Waits until cell k has been visited in this pass.
+static void wait_for_cell(const pass *o, bt_idx k)
+{
+    enum { TURNS = 2000 }; // some 50 µs: longer than a cell takes, unless its thread has lost its processor
+    for (int n = 0; atomic_load_explicit(&o->w->cells->turn[k].done, memory_order_acquire) != o->number; n++)
+        if (n > TURNS) sched_yield();
+}
+
+static void visit_cell(const pass *o, bt_idx k)
+{
+    bt_turn *turn = &o->w->cells->turn[k];
+    const bool waits = o->team > 1 && o->number;
+    for (bt_idx j = 0; waits && j < turn->n_before; j++) wait_for_cell(o, turn->before[j]);
+    o->visit(o->w, k, o->context, o->own);
+    if (waits) atomic_store_explicit(&turn->done, o->number, memory_order_release);
+}
+
+/// Cells of one stretch of the list: first those of this thread's share, then what others have
 /// not yet taken.
 static void visit_stretch(pass *o, int stretch)
 {
-    bt_cells *t = o->w->cells;
-    bt_share *share = &t->share[stretch * t->n_shares];
-    for (bt_idx n = 0; n < t->n_shares; n++) {
-        bt_share *s = &share[(o->me + n) % t->n_shares];
+    bt_share *share = &o->share[stretch * o->n_shares];
+    for (bt_idx n = 0; n < o->n_shares; n++) {
+        bt_share *s = &share[(o->me + n) % o->n_shares];
         for (;;) {
             if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) break;
             const bt_idx i = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
             if (i >= s->end) break;
-            o->visit(o->w, t->order[i], o->context, o->own);
+            visit_cell(o, o->list[i]);
         }
     }
 }
@@ -133,27 +179,39 @@ static void wait_for_team(const pass *o)
 #pragma omp barrier
 }
 
+/// All busy cells, a stretch of them for each thread.
+static void visit_before(pass *o)
+{
+    if (!o->before) return;
+    const bt_cells *t = o->w->cells;
+    const int64_t n = t->n_busy;
+    for (int64_t j = n * o->me / o->team, end = n * (o->me + 1) / o->team; j < end; j++)
+        o->before->visit(o->w, t->busy[j], o->before->context, NULL);
+    wait_for_team(o);
+}
+
 static void run_phases(pass *o)
 {
     bt_world *w = o->w;
     const bool among = w->exchange != NULL, sends = among && o->exchanged && o->me == 0;
     const bt_cells *t = w->cells;
+    visit_before(o);
     for (int p = 0; p < BT_PHASES; p++) {
+        if (p == BT_COLOURS && t->start[p] < t->start[p + 1]) wait_for_team(o);
         if (among) {
             visit_stretch(o, 2 * p);
             wait_for_team(o);
             if (sends) w->exchange->send(w, p, o->exchanged);
         }
-        if (t->start[p] + t->n_border[p] < t->start[p + 1]) visit_stretch(o, 2 * p + 1);
-        else if (!among) continue; // no other cell was here
+        visit_stretch(o, 2 * p + 1);
         if (sends) w->exchange->receive(w, p, o->exchanged);
-        wait_for_team(o);
+        if (among) wait_for_team(o);
     }
 }
 
 static void run_stretches(pass *o)
 {
-    for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(o, s);
+    for (int s = 0; s < o->n_stretches; s++) visit_stretch(o, s);
 }
 
 /// The pass on all threads. One thread goes without OpenMP: in libgomp a team of one and each of its barriers enter the
@@ -161,16 +219,16 @@ static void run_stretches(pass *o)
 /// merge totals of its own costs as much as a small cell.
 static void run_on_team(void run(pass *), pass *o, bt_totals *t)
 {
-    bt_cells *cells = o->w->cells;
-    open_shares(cells);
-    if (cells->n_shares == 1) {
+    for (bt_idx s = 0; s < o->n_stretches * o->n_shares; s++)
+        atomic_store_explicit(&o->share[s].next, o->share[s].begin, memory_order_relaxed);
+    if (o->n_shares == 1) {
         o->own = t;
         run(o);
         return;
     }
-#pragma omp parallel num_threads(cells->n_shares)
+#pragma omp parallel num_threads(o->n_shares)
     {
-        bt_totals own = {.n_sums = t->n_sums};
+        bt_totals own = {.n_sums = t->n_sums, .most = t->most, .most2 = t->most2};
         pass mine = *o;
         mine.me = omp_get_thread_num();
         mine.team = omp_get_num_threads();
@@ -182,9 +240,11 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *t)
 }
 
 /// The reference: what the schedule above comes to, without threads, shares, or an exchange under way.
-static void run_plain(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
+static void run_plain(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                      bt_totals *t)
 {
     const bt_cells *cs = w->cells;
+    for (bt_idx j = 0; before && j < cs->n_busy; j++) before->visit(w, cs->busy[j], before->context, NULL);
     for (int p = 0; p < BT_PHASES; p++) {
         for (bt_idx i = cs->start[p]; i < cs->start[p + 1]; i++) visit(w, cs->order[i], context, t);
         if (!w->exchange || !exchanged) continue;
@@ -193,47 +253,44 @@ static void run_plain(bt_world *w, bt_visit *visit, const void *context, bt_vel 
     }
 }
 
-void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
+void bt_phases_run(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                   bt_totals *t)
 {
     if (w->par.plain_schedule) {
-        run_plain(w, visit, context, exchanged, t);
+        run_plain(w, before, visit, context, exchanged, t);
         return;
     }
-    pass o = {.w = w, .visit = visit, .context = context, .exchanged = exchanged, .team = 1};
+    if (++w->cells->n_passes == 0) w->cells->n_passes = 1;
+    pass o = in_order(w, visit, context);
+    o.before = before, o.exchanged = exchanged, o.number = w->cells->n_passes;
     run_on_team(run_phases, &o, t);
 }
 
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
-    pass o = {.w = w, .visit = visit, .context = context, .team = 1};
+    pass o = in_order(w, visit, context);
     run_on_team(run_stretches, &o, t);
 }
 
-void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
+void bt_phases_listed(bt_world *w, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
+                      bt_totals *t)
 {
-    const bt_cells *ts = w->cells;
-    if (ts->n_shares == 1) {
-        for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
-        return;
-    }
-#pragma omp parallel for schedule(static) num_threads(ts->n_shares)
-    for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
+    const bt_idx team = BT_MANY(n, few) ? omp_get_max_threads() : 1;
+    bt_share share[team];
+    for (bt_idx s = 0; s < team; s++)
+        share[s] = (bt_share){.begin = (bt_idx)((int64_t)n * s / team), .end = (bt_idx)((int64_t)n * (s + 1) / team)};
+    pass o = {.w = w,
+              .list = list,
+              .share = share,
+              .n_stretches = 1,
+              .n_shares = team,
+              .visit = visit,
+              .context = context,
+              .team = 1};
+    run_on_team(run_stretches, &o, t);
 }
 
 void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
-    const bt_cells *ts = w->cells;
-    const bt_idx n = ts->n_busy;
-    if (!BT_MANY(n, BT_FEW_CELLS)) {
-        for (bt_idx j = 0; j < n; j++) visit(w, ts->busy[j], context, t);
-        return;
-    }
-#pragma omp parallel
-    {
-        bt_totals own = {.n_sums = t->n_sums, .most = t->most, .most2 = t->most2};
-#pragma omp for schedule(dynamic, 16)
-        for (bt_idx j = 0; j < n; j++) visit(w, ts->busy[j], context, &own);
-#pragma omp critical
-        bt_totals_merge(t, &own);
-    }
+    bt_phases_listed(w, w->cells->busy, w->cells->n_busy, BT_FEW_CELLS, visit, context, t);
 }

@@ -2,11 +2,15 @@
 // One pass over the active cells in the order of their phases (for the folders above src/space).
 //
 // What the result depends on is only this: of two cells that share a body, the one of lower phase comes first
-// (cells.h), and a pass ends before the next begins. So: all cells of phase 0 at once, then all of phase 1, ..., with a
-// barrier of the threads after each. Border cells and inner cells of a phase are a stretch each. Each thread has a
-// share of every stretch: neighbouring cells with its part of the work, the same from one residual pass to the next, so
-// that it finds in its caches what it left there; a thread that is done takes cells from the others' shares. Among
-// ranks the cells of a phase for which others wait come first, and their velocities travel while the rest is worked on.
+// (cells.h), and a pass ends before the next begins. So each thread goes through phase 0, then phase 1, ..., and before
+// it visits a cell it waits for those of the eight around it that come first (bt_turn). Threads meet at the end of the
+// pass only: around a berg a phase is some ten cells, and a barrier after each would leave one thread idle for half a
+// cell five times a sweep. No thread waits for ever: a cell that is waited for has been taken by a thread that waits
+// for lower phases alone. Border cells and inner cells of a phase are a stretch each. Each thread has a share of every
+// stretch: neighbouring cells with its part of the work, the same from one residual pass to the next, so that it finds
+// in its caches what it left there; a thread that is done takes cells from the others' shares. Among ranks threads do
+// meet after each stretch: the cells of a phase for which others wait come first, and their velocities travel while the
+// rest is worked on.
 //
 //     phase 0 (colour 0)       phase 1            ...   phase 4 (large bodies)
 //     border cells | inner     border | inner           one rank
@@ -30,8 +34,8 @@
 
 enum {
     BT_MAX_TOTALS = 28,
-    /// fewer contacts are swept faster by one thread: threads have to meet, which takes some microseconds
-    BT_FEW_CONTACTS = 700,
+    /// fewer contacts are swept faster by one thread: a team costs 2 µs, and a contact some 14 ns
+    BT_FEW_CONTACTS = 350,
 };
 
 /// What a pass adds up over cells and threads, and bt_domain_reduce over ranks (not most2): exact sums, and maxima.
@@ -53,19 +57,27 @@ void bt_phases_order(bt_world *w);
 /// Assign the cells to threads by the contacts that are listed in them. No result depends on it.
 void bt_phases_distribute(bt_world *w);
 
-/// Collective. Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are
-/// done at once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up
-/// to date on all ranks, while the other cells are still worked on.
-void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
+/// What a pass does first, with all busy cells, also those without contacts and of other ranks, for the sake of their
+/// bodies, in any order; no totals (NULL).
+typedef struct bt_before {
+    bt_visit *visit;
+    const void *context;
+} bt_before;
+
+/// Collective. After what comes before it (or NULL), visit the cells of phase 0, then those of phase 1, ...: those of
+/// one phase share no movable body and are done at once by threads and ranks. After each phase, `exchanged` (an array
+/// over the bodies, or NULL) is brought up to date on all ranks, while the other cells are still worked on.
+void bt_phases_run(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                   bt_totals *t);
 
 /// Visit the cells with work in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
-/// Visit all busy cells, also those without contacts and of other ranks, for the sake of their bodies, in any order; no
-/// totals (NULL). Threads are those of the sweeps.
-void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
+/// Visit cells [n] of a list in any order; not more than `few` are left to one thread. Totals are of this rank only.
+void bt_phases_listed(bt_world *w, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
+                      bt_totals *t);
 
-/// The same outside the solver: the number of cells decides on threads; totals are of this rank only.
+/// The same with all busy cells.
 void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
 #endif
