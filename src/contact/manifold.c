@@ -22,11 +22,12 @@
 #include <string.h>
 
 #include "contact/contacts.h"
+#include "base/cpu.h"
 #include "space/cells.h"
 #include "space/shore.h"
 #include "base/elementary.h"
 
-#define UNIT (float)(2 * BT_PI / 65536) // rad, of bt_axes.turn
+#define UNIT (2 * BT_PI / 65536) // rad, of bt_axes.turn
 #define ROUNDED 5                // of them: less than two a body by rounding, and all other rounding
 #define AROUND 50                // ties around the best within which separations are exact: they bound leads
 
@@ -47,7 +48,7 @@ static polygon polygon_of(const bt_bodies *b, bt_idx i, int part, double x, doub
 
 /// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a
 /// floe's memory.
-static inline void edge_normal(const polygon *p, int i, double *nx, double *ny)
+BT_INLINE void edge_normal(const polygon *p, int i, double *nx, double *ny)
 {
     const double *v = p->v + 2 * i, *next = p->v + 2 * (i + 1 < p->count ? i + 1 : 0);
     *nx = (next[1] - v[1]) * p->per_length[i];
@@ -60,7 +61,7 @@ typedef struct { double s, nx, ny; int i; } edge;
 /// Edge i of p and the signed distance of q from it; when that is certainly less than `floor`, a bound from above: q
 /// holds its centroid, so it reaches nearer to the edge's line than that does. One product instead of one a vertex, and
 /// it rules out two edges of three.
-static inline edge edge_of(const polygon *p, int i, const polygon *q, double floor)
+BT_INLINE edge edge_of(const polygon *p, int i, const polygon *q, double floor)
 {
     edge e = {.i = i};
     edge_normal(p, i, &e.nx, &e.ny);
@@ -75,7 +76,7 @@ static inline edge edge_of(const polygon *p, int i, const polygon *q, double flo
 
 /// The edge of p that separates q most, exact if it does so by `floor`, and its lead on any other edge; stops at the
 /// first one that separates by more than `enough`.
-static edge best_edge(const polygon *p, const polygon *q, double enough, double floor, double *lead)
+BT_INLINE edge best_edge(const polygon *p, const polygon *q, double enough, double floor, double *lead)
 {
     edge best = {.s = -INFINITY};
     double second = -INFINITY;
@@ -139,7 +140,7 @@ static void set_point(bt_manifold *m, double x, double y, double gap, double dx,
     *p = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - dx, y - dy}, .feature = feature};
 }
 
-static inline double cosine(const polygon *q, int j, const edge *e)
+BT_INLINE double cosine(const polygon *q, int j, const edge *e)
 {
     double nx, ny;
     edge_normal(q, j, &nx, &ny);
@@ -148,7 +149,7 @@ static inline double cosine(const polygon *q, int j, const edge *e)
 
 /// Edge of q that faces another one most squarely. It is the guess, unless that is -1, if the edges beside it face it
 /// less so: normals turn one way around an outline.
-static inline int facing_edge(const polygon *q, const edge *e, int guess)
+BT_INLINE int facing_edge(const polygon *q, const edge *e, int guess)
 {
     if (guess >= 0) {
         const double d = cosine(q, guess, e) + 1e-9;
@@ -173,7 +174,7 @@ static bounds bounds_of(const bt_world *w, double margin) { return (bounds){marg
 
 /// Points of the incident polygon, of its edge `facing`, that face the reference edge, or what counts of it on a shore
 /// (shown, or NULL); `flip` when the reference is b.
-static inline __attribute__((always_inline)) void clip_points(const polygon *ref, const edge *e, const bt_face *shown, const polygon *inc, int facing,
+BT_INLINE void clip_points(const polygon *ref, const edge *e, const bt_face *shown, const polygon *inc, int facing,
                         bool flip, const double d[2], bounds most, bt_manifold *m)
 {
     const double nx = e->nx, ny = e->ny;
@@ -272,7 +273,7 @@ static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, con
 
 /// Is the edge of b the reference? Two edges that face each other squarely have nearly the same separation: keep the
 /// reference of the step before, so that features, and with them impulses, persist.
-static inline bool reference_is_b(const edge *a, const edge *b, double tie, int before)
+BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int before)
 {
     bool ref_b = b->s > a->s;
     if (!isfinite(a->s) || !isfinite(b->s)) return ref_b;
@@ -287,24 +288,27 @@ static inline bool reference_is_b(const edge *a, const edge *b, double tie, int 
 /// 1 % of the smaller floe's radius.
 static double tie_of(const bt_bodies *b, bt_idx i, bt_idx j) { return 0.01 * bt_min(b->radius[i], b->radius[j]); }
 
+/// Of a yaw that is no number, or as good as none, any: guards end such a run.
+BT_INLINE uint16_t turn_of(double yaw) { return fabs(yaw) < 1e9 ? (uint16_t)(int64_t)(yaw * (1 / UNIT)) : 0; }
+
 /// Where bodies i and j are: axes that are not known.
-static bt_axes place_of(const bt_bodies *b, bt_idx i, bt_idx j, const double d[2])
+BT_INLINE bt_axes place_of(const bt_bodies *b, bt_idx i, bt_idx j, const double d[2])
 {
     return (bt_axes){.x = (float)d[0], .y = (float)d[1], .room = -1, .edge = {-1, -1},
-                     .turn = {(uint16_t)(int64_t)(b->pose[i].yaw * (1 / UNIT)), (uint16_t)(int64_t)(b->pose[j].yaw * (1 / UNIT))}};
+                     .turn = {turn_of(b->pose[i].yaw), turn_of(b->pose[j].yaw)}};
 }
 
 /// No separation by an edge has changed by more than this from k to `now`; radius: the larger one.
-static float motion(const bt_axes *k, const bt_axes *now, float radius)
+BT_INLINE float motion(const bt_axes *k, const bt_axes *now, float radius)
 {
     const int turn = abs((int16_t)(now->turn[0] - k->turn[0])) + abs((int16_t)(now->turn[1] - k->turn[1])) + ROUNDED;
-    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * UNIT * (fabsf(k->x) + fabsf(k->y) + radius);
+    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * (float)UNIT * (fabsf(k->x) + fabsf(k->y) + radius);
 }
 
 /// The edges e of a and b that separate the two most. False as soon as one separates by more than the margin. Those of
 /// the last search usually do so again, or are the best for certain (motion). Where not, an edge that separates by less
 /// than they, and by more than the tie, is neither the best nor in question. An edge that does not count has s = -∞.
-static bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius, const bt_axes *now,
+BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius, const bt_axes *now,
                       bt_axes *k, edge e[2])
 {
     e[0] = k->edge[0] >= 0 ? edge_of(a, k->edge[0], b, -INFINITY) : (edge){-INFINITY, .i = -1};
@@ -328,6 +332,7 @@ static bool find_axes(const polygon *a, const polygon *b, double margin, double 
 }
 
 /// Of bodies that are convex. *gap: the largest separation, a lower bound of the distance.
+BT_FOR_EACH_CPU
 static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
                          bt_axes *k, double *gap)
 {
