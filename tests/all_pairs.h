@@ -35,10 +35,8 @@ static inline void brute_force(const bt_world *w, double margin, bt_manifold **m
             for (int p = bt_part_first(b, i); p >= 0; p = bt_part_next(b, i, p))
                 for (int q = bt_part_first(b, j); q >= 0; q = bt_part_next(b, j, q)) {
                     if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
-                    double gap;
-                    int32_t axis = -1;
                     if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man],
-                                          &gap, &axis))
+                                          NULL))
                         ++*n_man;
                 }
         }

@@ -15,6 +15,7 @@
 #define BERGTOW_CONTACTS_H
 
 #include "body/bodies.h"
+#include "space/cells.h"
 #include "space/margin.h"
 
 /// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
@@ -53,10 +54,9 @@ void bt_contacts_detect(bt_world *w, bool again);
 double bt_contacts_overlap(bt_world *w);
 
 /// Manifold of one convex part of each body (bt_pair.part) at the present poses; false when the gap exceeds margin.
-/// reference_before (0: edge of a, 1: of b, −1: none) settles ties between nearly equal reference edges. gap_out: the
-/// largest separation over the edge normals of both (a lower bound of the distance), axis_out its edge (numbered as in
-/// bt_pair).
+/// reference_before (0: edge of a, 1: of b, −1: none) settles ties between nearly equal reference edges. axes: what is
+/// known of the pair from its last search, on return from this one, with which the result is the same; or NULL.
 bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
-                       int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
+                       int reference_before, bt_manifold *m, bt_axes *axes);
 
 #endif

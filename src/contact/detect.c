@@ -161,7 +161,7 @@ static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
             bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
             if (bt_laws[law]->contact(w, p, &t->laws.memory[at], &edge, sheets)) {
                 s->man[k] = edge;
-                bt_pack_keep(s);
+                s->n++;
             } else {
                 s->man[k] = *sheets;
                 p->contact = -1;
@@ -186,25 +186,19 @@ static void narrow_phase(bt_world *w, bt_idx k, const void *scratch, bt_totals *
         const bt_idx i = near ? t->search.near[j] : j;
         bt_pair *p = &t->search.pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
-        if (paths + t->margin < p->reach) {
+        if (paths + t->margin < p->axes.reach) {
             p->contact = -1;
-            if (!near && !(paths + far < p->reach)) bt_pairs_add_near(t, i);
+            if (!near && !(paths + far < p->axes.reach)) bt_pairs_add_near(t, i);
             continue;
         }
         if (!near) bt_pairs_add_near(t, i);
-        double gap;
-        int32_t axis = p->axis;
         bt_manifold *m = bt_pack_next(&s->pack, i);
         const int reference_before = p->contact >= 0 ? (int)(t->gaps[p->contact].feature[0] >> 31) : -1;
-        const bool touch =
-            bt_contacts_parts(w, p->a, p->b, p->part, t->margin, reference_before, m, &gap, &axis);
-        p->axis = (int16_t)axis;
-        p->reach = gap + paths;
-        if (!touch) {
+        if (!bt_contacts_parts(w, p->a, p->b, p->part, t->margin, reference_before, m, &p->axes)) {
             p->contact = -1;
             continue;
         }
-        bt_pack_keep(&s->pack);
+        s->pack.n++;
         several = several || p->part[0] || p->part[1] || bt_shore_holds(w, p->a) || bt_shore_holds(w, p->b);
     }
     if (several) merge(w, t, &s->pack);
@@ -327,9 +321,7 @@ static bt_overlaps overlaps_of(const bt_world *w, const bt_cell *t, double allow
             pair = (bt_overlaps){.a = a, .b = b};
         }
         bt_manifold m;
-        double gap;
-        int32_t axis = -1;
-        if (!bt_contacts_parts(w, q->a, q->b, q->part, 0, -1, &m, &gap, &axis)) continue;
+        if (!bt_contacts_parts(w, q->a, q->b, q->part, 0, -1, &m, NULL)) continue;
         for (int j = 0; j < m.n_points; j++) pair.deepest = bt_max(pair.deepest, 0 - m.p[j].gap);
         pair.pairs = pair.deepest > allowed;
     }

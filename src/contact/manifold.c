@@ -9,14 +9,27 @@
 // floes lying edge to edge resist turning. Two vertices facing each other get one point with the normal along the
 // line that joins them: there an edge normal would feign a wall in front of a passing corner.
 //
+// Which edges are the best changes seldom, while a full search is half of the work. So a pair keeps them, with how much
+// they lead. For centroids d apart, s_i is n_i·d and a part that depends on the difference of the yaws alone; so a
+// motion by Δd and turns φ changes no s_i by more than |Δd| + |φ| |d| + |φ_a − φ_b| r, and what is first stays so while
+// twice this is less than its lead on the second. Until then these edges are all that is looked at, and the result is
+// that of the full search to the last bit. Rejected: lengths of paths as the bound, which need less memory (floes that
+// are pushed ahead move far, but with each other).
+//
 // Rejected: GJK with a contact patch (more code, and iterative on a problem that has at most a dozen vertices).
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "contact/contacts.h"
+#include "base/cpu.h"
 #include "space/cells.h"
 #include "space/shore.h"
 #include "base/elementary.h"
+
+#define UNIT (2 * BT_PI / 65536) // rad, of bt_axes.turn
+#define ROUNDED 5                // of them: less than two a body by rounding, and all other rounding
+#define AROUND 50                // ties around the best within which separations are exact: they bound leads
 
 typedef struct {
     const double *v;     ///< outline, relative to the centroid
@@ -35,40 +48,44 @@ static polygon polygon_of(const bt_bodies *b, bt_idx i, int part, double x, doub
 
 /// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a
 /// floe's memory.
-static inline void edge_normal(const polygon *p, int i, double *nx, double *ny)
+BT_INLINE void edge_normal(const polygon *p, int i, double *nx, double *ny)
 {
     const double *v = p->v + 2 * i, *next = p->v + 2 * (i + 1 < p->count ? i + 1 : 0);
     *nx = (next[1] - v[1]) * p->per_length[i];
     *ny = (v[0] - next[0]) * p->per_length[i];
 }
 
-/// Signed distance of q from edge i of p; −∞ when it is certainly less than `floor`: q holds its centroid, so it
-/// reaches nearer to the edge's line than that does. One product instead of one a vertex, and it rules out two edges of
-/// three.
-static inline double edge_separation(const polygon *p, int i, const polygon *q, double floor)
+/// An edge: how far it separates the other polygon from its own, and its outward unit normal.
+typedef struct { double s, nx, ny; int i; } edge;
+
+/// Edge i of p and the signed distance of q from it; when that is certainly less than `floor`, a bound from above: q
+/// holds its centroid, so it reaches nearer to the edge's line than that does. One product instead of one a vertex, and
+/// it rules out two edges of three.
+BT_INLINE edge edge_of(const polygon *p, int i, const polygon *q, double floor)
 {
-    double nx, ny;
-    edge_normal(p, i, &nx, &ny);
-    const double centre = nx * (q->x - p->x - p->v[2 * i]) + ny * (q->y - p->y - p->v[2 * i + 1]);
-    if (centre < floor) return -INFINITY;
-    double least = INFINITY;
-    for (int j = 0; j < q->count; j++) least = bt_min(least, nx * q->v[2 * j] + ny * q->v[2 * j + 1]);
-    return least + centre;
+    edge e = {.i = i};
+    edge_normal(p, i, &e.nx, &e.ny);
+    e.s = e.nx * (q->x - p->x - p->v[2 * i]) + e.ny * (q->y - p->y - p->v[2 * i + 1]);
+    if (e.s < floor) return e;
+    const double *v = q->v, *end = v + 2 * q->count;
+    double least = e.nx * v[0] + e.ny * v[1];
+    for (v += 2; v < end; v += 2) least = bt_min(e.nx * v[0] + e.ny * v[1], least);
+    e.s += least;
+    return e;
 }
 
-/// Largest edge separation of q from p, exact if it is at least `floor`; stops at the first edge that separates by more
-/// than `enough`.
-static double max_separation(const polygon *p, const polygon *q, double enough, double floor, int *edge)
+/// The edge of p that separates q most, exact if it does so by `floor`, and its lead on any other edge; stops at the
+/// first one that separates by more than `enough`.
+BT_INLINE edge best_edge(const polygon *p, const polygon *q, double enough, double floor, double *lead)
 {
-    double best = -INFINITY;
-    for (int i = 0; i < p->count; i++) {
-        const double s = edge_separation(p, i, q, floor);
-        if (s > best) {
-            best = s;
-            *edge = i;
-            if (best > enough) break;
-        }
+    edge best = {.s = -INFINITY};
+    double second = -INFINITY;
+    for (int i = 0; i < p->count && !(best.s > enough); i++) {
+        const edge e = edge_of(p, i, q, floor);
+        second = bt_max(second, bt_min(e.s, best.s));
+        if (e.s > best.s) best = e;
     }
+    *lead = best.s < floor ? 0 : best.s - second;
     return best;
 }
 
@@ -88,8 +105,8 @@ static void world_vertex(const polygon *p, int i, double out[2])
 }
 
 /// Nearest features of two separated polygons, by trying every vertex against every edge. Returns true when two
-/// vertices are nearest (*ip of p, *iq of q); otherwise *edge is the edge and *of_q says whose.
-static bool nearest_features(const polygon *p, const polygon *q, int *ip, int *iq, int *edge, bool *of_q)
+/// vertices are nearest (*ip of p, *iq of q); otherwise *near is the edge and *of_q says whose.
+static bool nearest_features(const polygon *p, const polygon *q, int *ip, int *iq, int *near, bool *of_q)
 {
     double best = INFINITY, x[2], e[2], f[2], t;
     bool corners = false;
@@ -108,7 +125,7 @@ static bool nearest_features(const polygon *p, const polygon *q, int *ip, int *i
                 int k = t <= 0 ? i : next;
                 *ip = side ? j : k;
                 *iq = side ? k : j;
-                *edge = i;
+                *near = i;
                 *of_q = side;
             }
         }
@@ -123,19 +140,28 @@ static void set_point(bt_manifold *m, double x, double y, double gap, double dx,
     *p = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - dx, y - dy}, .feature = feature};
 }
 
-/// Edge of q that faces a normal most squarely.
-static int facing_edge(const polygon *q, double nx, double ny)
+BT_INLINE double cosine(const polygon *q, int j, const edge *e)
 {
+    double nx, ny;
+    edge_normal(q, j, &nx, &ny);
+    return e->nx * nx + e->ny * ny;
+}
+
+/// Edge of q that faces another one most squarely. It is the guess, unless that is -1, if the edges beside it face it
+/// less so: normals turn one way around an outline.
+BT_INLINE int facing_edge(const polygon *q, const edge *e, int guess)
+{
+    if (guess >= 0) {
+        const double d = cosine(q, guess, e) + 1e-9;
+        if (d < cosine(q, guess > 0 ? guess - 1 : q->count - 1, e) &&
+            d < cosine(q, guess + 1 < q->count ? guess + 1 : 0, e))
+            return guess;
+    }
     int facing = 0;
     double least = INFINITY;
     for (int j = 0; j < q->count; j++) {
-        double jx, jy;
-        edge_normal(q, j, &jx, &jy);
-        double d = nx * jx + ny * jy;
-        if (d < least) {
-            least = d;
-            facing = j;
-        }
+        const double d = cosine(q, j, e);
+        if (d < least) least = d, facing = j;
     }
     return facing;
 }
@@ -146,20 +172,19 @@ typedef struct { double margin, beside; } bounds;
 
 static bounds bounds_of(const bt_world *w, double margin) { return (bounds){margin, w->cells->beside}; }
 
-/// Points of the incident polygon that face reference edge i, or what counts of it on a shore (shown, or NULL); `flip`
-/// when the reference is b.
-static void clip_points(const polygon *ref, int i, const bt_face *shown, const polygon *inc, bool flip, double dx,
-                        double dy, bounds most, bt_manifold *m)
+/// Points of the incident polygon, of its edge `facing`, that face the reference edge, or what counts of it on a shore
+/// (shown, or NULL); `flip` when the reference is b.
+BT_INLINE void clip_points(const polygon *ref, const edge *e, const bt_face *shown, const polygon *inc, int facing,
+                        bool flip, const double d[2], bounds most, bt_manifold *m)
 {
-    double nx, ny;
-    edge_normal(ref, i, &nx, &ny);
+    const double nx = e->nx, ny = e->ny;
+    const int i = e->i;
     const double tx = -ny, ty = nx; // along the edge: outlines run anticlockwise
     double r[2], rn[2];
     world_vertex(ref, i, r);
     world_vertex(ref, i + 1 < ref->count ? i + 1 : 0, rn);
     const double from = shown ? shown->from : 0, to = shown ? shown->to : tx * (rn[0] - r[0]) + ty * (rn[1] - r[1]);
 
-    const int facing = facing_edge(inc, nx, ny);
     int other = facing + 1 < inc->count ? facing + 1 : 0;
     double p[2], q[2];
     world_vertex(inc, facing, p); // the incident edge runs against the reference edge: p is far along t
@@ -202,18 +227,17 @@ static void clip_points(const polygon *ref, int i, const bt_face *shown, const p
     // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
     for (int k = 0; k < kept; k++)
         set_point(m, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny, ends[k].gap,
-                  dx, dy, base | ends[k].id);
+                  d[0], d[1], base | ends[k].id);
 }
 
-/// The deepest vertex of inc below reference edge i as the only point.
-static void deepest_point(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy,
+/// The deepest vertex of inc below the reference edge as the only point.
+static void deepest_point(const polygon *ref, const edge *e, const polygon *inc, bool flip, const double d[2],
                           bt_manifold *m)
 {
-    double nx, ny;
-    edge_normal(ref, i, &nx, &ny);
+    const double nx = e->nx, ny = e->ny;
     double r[2], x[2], least = INFINITY;
     int deepest = 0;
-    world_vertex(ref, i, r);
+    world_vertex(ref, e->i, r);
     for (int j = 0; j < inc->count; j++) {
         world_vertex(inc, j, x);
         double g = nx * (x[0] - r[0]) + ny * (x[1] - r[1]);
@@ -225,8 +249,8 @@ static void deepest_point(const polygon *ref, int i, const polygon *inc, bool fl
     world_vertex(inc, deepest, x);
     m->nx = flip ? -nx : nx;
     m->ny = flip ? -ny : ny;
-    set_point(m, x[0] - 0.5 * least * nx, x[1] - 0.5 * least * ny, least, dx, dy,
-              ((uint32_t)flip << 31) | ((uint32_t)i << 20) | (uint32_t)deepest << 1);
+    set_point(m, x[0] - 0.5 * least * nx, x[1] - 0.5 * least * ny, least, d[0], d[1],
+              ((uint32_t)flip << 31) | ((uint32_t)e->i << 20) | (uint32_t)deepest << 1);
 }
 
 /// Two corners, ca of a and cb of b, as the only point: the normal is along the line that joins them. False beyond the
@@ -247,84 +271,100 @@ static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, con
     return true;
 }
 
-/// An edge of each polygon, and how far it separates the two; −∞ where none counts.
-typedef struct { double sa, sb; int ia, ib; } best_axes;
-
 /// Is the edge of b the reference? Two edges that face each other squarely have nearly the same separation: keep the
 /// reference of the step before, so that features, and with them impulses, persist.
-static inline bool reference_is_b(const polygon *a, const polygon *b, const best_axes *s, double tie, int before)
+BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int before)
 {
-    bool ref_b = s->sb > s->sa;
-    if (!isfinite(s->sa) || !isfinite(s->sb)) return ref_b;
-    double ax, ay, bx, by;
-    edge_normal(a, s->ia, &ax, &ay);
-    edge_normal(b, s->ib, &bx, &by);
-    const bool square = ax * bx + ay * by < -0.98;
-    if (square && before >= 0 && fabs(s->sa - s->sb) < tie) ref_b = before;
-    else if (square && before < 0 && s->sb < s->sa + tie) ref_b = false;
+    bool ref_b = b->s > a->s;
+    if (!isfinite(a->s) || !isfinite(b->s)) return ref_b;
+    const bool square = a->nx * b->nx + a->ny * b->ny < -0.98;
+    if (square && before >= 0 && fabs(a->s - b->s) < tie) ref_b = before;
+    else if (square && before < 0 && b->s < a->s + tie) ref_b = false;
     // apart by one of them: the tie must not feign overlap
-    if (bt_max(s->sa, s->sb) > 0 && (ref_b ? s->sb : s->sa) <= 0) ref_b = !ref_b;
+    if (bt_max(a->s, b->s) > 0 && (ref_b ? b->s : a->s) <= 0) ref_b = !ref_b;
     return ref_b;
 }
 
 /// 1 % of the smaller floe's radius.
 static double tie_of(const bt_bodies *b, bt_idx i, bt_idx j) { return 0.01 * bt_min(b->radius[i], b->radius[j]); }
 
-/// The edges that separate a and b most. False, with a separating axis and its gap, as soon as one separates by more
-/// than the margin. *axis on entry: the one of the last step. It usually separates again. Where not, an edge that
-/// separates by less than that one, and by more than the tie, is neither the best nor in question; so only the others
-/// are looked at in full, and the result is the same with any hint.
-static bool find_axes(const polygon *a, const polygon *b, double margin, double tie, best_axes *s, double *gap,
-                      int32_t *axis)
+/// Of a yaw that is no number, or as good as none, any: guards end such a run.
+BT_INLINE uint16_t turn_of(double yaw) { return fabs(yaw) < 1e9 ? (uint16_t)(int64_t)(yaw * (1 / UNIT)) : 0; }
+
+/// Where bodies i and j are: axes that are not known.
+BT_INLINE bt_axes place_of(const bt_bodies *b, bt_idx i, bt_idx j, const double d[2])
 {
-    const int32_t hint = *axis;
-    double known = -INFINITY;
-    if (hint >= 0 && hint < a->count + b->count) {
-        known = hint < a->count ? edge_separation(a, hint, b, -INFINITY)
-                                : edge_separation(b, hint - a->count, a, -INFINITY);
-        *gap = known;
-        if (known > margin) return false;
-    }
-    s->sa = *gap = max_separation(a, b, margin, known - 2 * tie, &s->ia);
-    *axis = s->ia;
-    if (s->sa > margin) return false;
-    s->sb = *gap = max_separation(b, a, margin, bt_max(known, s->sa) - 2 * tie, &s->ib);
-    *axis = a->count + s->ib;
-    return !(s->sb > margin);
+    return (bt_axes){.x = (float)d[0], .y = (float)d[1], .room = -1, .edge = {-1, -1},
+                     .turn = {turn_of(b->pose[i].yaw), turn_of(b->pose[j].yaw)}};
 }
 
-/// Of bodies that are convex.
+/// No separation by an edge has changed by more than this from k to `now`; radius: the larger one.
+BT_INLINE float motion(const bt_axes *k, const bt_axes *now, float radius)
+{
+    const int turn = abs((int16_t)(now->turn[0] - k->turn[0])) + abs((int16_t)(now->turn[1] - k->turn[1])) + ROUNDED;
+    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * (float)UNIT * (fabsf(k->x) + fabsf(k->y) + radius);
+}
+
+/// The edges e of a and b that separate the two most. False as soon as one separates by more than the margin. Those of
+/// the last search usually do so again, or are the best for certain (motion). Where not, an edge that separates by less
+/// than they, and by more than the tie, is neither the best nor in question. An edge that does not count has s = -∞.
+BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius, const bt_axes *now,
+                      bt_axes *k, edge e[2])
+{
+    e[0] = k->edge[0] >= 0 ? edge_of(a, k->edge[0], b, -INFINITY) : (edge){-INFINITY, .i = -1};
+    e[1] = k->edge[1] >= 0 ? edge_of(b, k->edge[1], a, -INFINITY) : (edge){-INFINITY, .i = -1};
+    const double known = bt_max(e[0].s, e[1].s);
+    if (known > margin) return false;
+    if (motion(k, now, radius) < k->room) return true;
+    double lead[2];
+    *k = *now;
+    e[0] = best_edge(a, b, margin, known - AROUND * tie, &lead[0]);
+    k->edge[0] = (int8_t)e[0].i;
+    if (e[0].s > margin) return false;
+    e[1] = best_edge(b, a, margin, bt_max(known, e[0].s) - AROUND * tie, &lead[1]);
+    k->edge[1] = (int8_t)e[1].i;
+    const bool first = e[1].s > e[0].s;
+    const double both = bt_min(lead[0], lead[1]), alone = bt_min(lead[first], fabs(e[0].s - e[1].s) - tie);
+    if (alone > both) k->edge[!first] = -1;
+    if (e[1].s > margin) return false;
+    k->room = (float)(0.5 * bt_max(both, alone));
+    return true;
+}
+
+/// Of bodies that are convex. *gap: the largest separation, a lower bound of the distance.
+BT_FOR_EACH_CPU
 static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
-                         double *gap_out, int32_t *axis_out)
+                         bt_axes *k, double *gap)
 {
     double d[2];
     bt_bodies_offset(w, a, b, d);
-    const polygon pa = polygon_of(&w->bodies, a, 0, 0, 0), pb = polygon_of(&w->bodies, b, 0, d[0], d[1]);
+    const bt_axes now = place_of(&w->bodies, a, b, d);
+    const polygon p[2] = {polygon_of(&w->bodies, a, 0, 0, 0), polygon_of(&w->bodies, b, 0, d[0], d[1])};
     const double tie = tie_of(&w->bodies, a, b);
-    best_axes s = {0};
-    if (!find_axes(&pa, &pb, margin, tie, &s, gap_out, axis_out)) return false;
-    const bool ref_b = reference_is_b(&pa, &pb, &s, tie, reference_before);
-    const double sep = ref_b ? s.sb : s.sa;
-    const int edge = ref_b ? s.ib : s.ia;
-    *gap_out = bt_max(s.sa, s.sb);
-    *axis_out = ref_b ? pa.count + s.ib : s.ia;
+    const float radius = (float)bt_max(w->bodies.radius[a], w->bodies.radius[b]);
+    edge e[2];
+    const bool apart = !find_axes(&p[0], &p[1], margin, tie, radius, &now, k, e);
+    *gap = bt_max(e[0].s, e[1].s);
+    if (apart) return false;
+    const bool ref = reference_is_b(&e[0], &e[1], tie, reference_before);
+    const double sep = e[ref].s;
 
-    *m = (bt_manifold){.a = a, .b = b};
-    const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
+    m->a = a, m->b = b, m->n_points = 0; // and no more: the rest follows with the points
     const bounds most = bounds_of(w, margin);
-    clip_points(ref, edge, NULL, inc, ref_b, d[0], d[1], most, m);
+    clip_points(&p[ref], &e[ref], NULL, &p[!ref], facing_edge(&p[!ref], &e[ref], e[!ref].i), ref, d, most, m);
     if (!(sep > 0)) {
-        if (m->n_points == 0) deepest_point(ref, edge, inc, ref_b, d[0], d[1], m);
+        if (m->n_points == 0) deepest_point(&p[ref], &e[ref], &p[!ref], ref, d, m);
         return true;
     }
     if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
     // The nearest vertex lies beside the reference edge, and not by the tilt of two nearly parallel edges: a corner is
     // near.
     m->n_points = 0;
-    int ca = 0, cb = 0, e = 0;
+    int ca = 0, cb = 0, near = 0;
     bool of_b = false;
-    if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) return join_corners(&pa, ca, &pb, cb, d, margin, m);
-    clip_points(of_b ? &pb : &pa, e, NULL, of_b ? &pa : &pb, of_b, d[0], d[1], most, m);
+    if (nearest_features(&p[0], &p[1], &ca, &cb, &near, &of_b)) return join_corners(&p[0], ca, &p[1], cb, d, margin, m);
+    const edge with = edge_of(&p[of_b], near, &p[!of_b], INFINITY);
+    clip_points(&p[of_b], &with, NULL, &p[!of_b], facing_edge(&p[!of_b], &with, -1), of_b, d, most, m);
     return m->n_points > 0;
 }
 
@@ -419,48 +459,40 @@ static bool shows_at(const part_of_body *q, int i, const double x[2])
 
 /// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count, and
 /// where others cover an end of it, what shows.
-static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
-                             bounds most, bt_manifold *m)
+static void clip_what_counts(const part_of_body *ref, const edge *e, const part_of_body *inc, bool flip,
+                             const double d[2], bounds most, bt_manifold *m)
 {
-    clip_points(&ref->p, i, ref->face ? &ref->face[i] : NULL, &inc->p, flip, d[0], d[1], most, m);
-    double nx, ny;
-    edge_normal(&ref->p, i, &nx, &ny);
-    const int facing = facing_edge(&inc->p, nx, ny);
+    const int facing = facing_edge(&inc->p, e, -1);
+    clip_points(&ref->p, e, ref->face ? &ref->face[e->i] : NULL, &inc->p, facing, flip, d, most, m);
     const bool partly = covered_at_an_end(inc, facing);
     if (edge_counts(inc, facing) && !partly) return;
     int kept = 0;
     for (int k = 0; k < m->n_points; k++) {
         const uint32_t id = m->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
-        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -nx, -ny);
+        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -e->nx, -e->ny);
         if (corner || (partly && shows_at(inc, facing, m->p[k].ra))) m->p[kept++] = m->p[k];
     }
     m->n_points = kept;
 }
 
-/// Do others cover an end of edge i of p, or of the edge of q that faces it, and is nothing else between them?
-static bool beside_what_shows(const part_of_body *p, int i, const part_of_body *q)
+/// Do others cover an end of edge e of p, or of the edge of q that faces it, and is nothing else between them?
+static bool beside_what_shows(const part_of_body *p, const edge *e, const part_of_body *q)
 {
-    double nx, ny;
-    edge_normal(&p->p, i, &nx, &ny);
-    if (!covered_at_an_end(p, i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, nx, ny)))) return false;
+    if (!covered_at_an_end(p, e->i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, e, -1)))) return false;
     bt_manifold m = {0};
-    clip_what_counts(p, i, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &m);
+    clip_what_counts(p, e, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &m);
     return m.n_points == 0;
 }
 
-/// Largest separation of q from p over the edges of p that count, against corners of q that do.
-static double separation_that_counts(const part_of_body *p, const part_of_body *q, int *edge)
+/// The edge of p that separates q most, of those that count, against corners of q that do.
+static edge best_that_counts(const part_of_body *p, const part_of_body *q)
 {
-    double best = -INFINITY;
+    edge best = {.s = -INFINITY};
     for (int i = 0; i < p->p.count; i++) {
         if (!edge_counts(p, i)) continue;
-        const double s = edge_separation(&p->p, i, &q->p, -INFINITY);
-        if (s <= best) continue;
-        double nx, ny;
-        edge_normal(&p->p, i, &nx, &ny);
-        if (!corner_counts(q, support(&q->p, nx, ny), -nx, -ny) || beside_what_shows(p, i, q)) continue;
-        best = s;
-        *edge = i;
+        const edge e = edge_of(&p->p, i, &q->p, -INFINITY);
+        if (e.s > best.s && corner_counts(q, support(&q->p, e.nx, e.ny), -e.nx, -e.ny) && !beside_what_shows(p, &e, q))
+            best = e;
     }
     return best;
 }
@@ -469,65 +501,73 @@ static double separation_that_counts(const part_of_body *p, const part_of_body *
 static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], bounds most,
                             bt_manifold *m)
 {
-    int ca = 0, cb = 0, e = 0;
+    int ca = 0, cb = 0, near = 0;
     bool of_b = false;
     m->n_points = 0;
-    if (nearest_features(&a->p, &b->p, &ca, &cb, &e, &of_b)) {
+    if (nearest_features(&a->p, &b->p, &ca, &cb, &near, &of_b)) {
         return join_corners(&a->p, ca, &b->p, cb, d, most.margin, m) && corner_counts(a, ca, m->nx, m->ny) &&
                corner_counts(b, cb, -m->nx, -m->ny);
     }
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
-    double nx, ny;
-    edge_normal(&ref->p, e, &nx, &ny);
-    if (!edge_counts(ref, e) || !corner_counts(inc, of_b ? ca : cb, -nx, -ny) || beside_what_shows(ref, e, inc))
+    const edge e = edge_of(&ref->p, near, &inc->p, INFINITY);
+    if (!edge_counts(ref, near) || !corner_counts(inc, of_b ? ca : cb, -e.nx, -e.ny) || beside_what_shows(ref, &e, inc))
         return false;
-    clip_what_counts(ref, e, inc, of_b, d, most, m);
-    if (m->n_points == 0) deepest_point(&ref->p, e, &inc->p, of_b, d[0], d[1], m);
+    clip_what_counts(ref, &e, inc, of_b, d, most, m);
+    if (m->n_points == 0) deepest_point(&ref->p, &e, &inc->p, of_b, d, m);
     return bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= most.margin;
 }
 
-bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
-                       int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out)
+static bool parts_touch(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
+                        int reference_before, bt_manifold *m, bt_axes *known, double *gap)
 {
-    const bool convex = part[0] == 0 && part[1] == 0;
-    if (convex && !bt_shore_holds(w, ia) && !bt_shore_holds(w, ib))
-        return bodies_touch(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
     bt_bodies_offset(w, ia, ib, d);
-    const part_of_body a = part_of(w, ia, part[0], 0, 0), b = part_of(w, ib, part[1], d[0], d[1]);
+    const part_of_body p[2] = {part_of(w, ia, part[0], 0, 0), part_of(w, ib, part[1], d[0], d[1])};
     const double tie = tie_of(&w->bodies, ia, ib);
-    // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the
-    // last axis first.
-    const int32_t n = a.p.count + b.p.count, hint = *axis_out >= 0 && *axis_out < n ? *axis_out : 0;
+    // Parts do not hold the centroid of their body, which rules out edges in best_edge: all edges in full, the last
+    // axis first.
+    const int n_a = p[0].p.count, n = n_a + p[1].p.count,
+              hint = known->edge[0] >= 0 ? known->edge[0] : known->edge[1] >= 0 ? n_a + known->edge[1] : 0;
+    *known = (bt_axes)BT_NO_AXES;
     double best = -INFINITY;
-    for (int32_t k = 0; k < n; k++) {
-        const int32_t axis = k == 0 ? hint : k <= hint ? k - 1 : k;
-        const double s = axis < a.p.count ? edge_separation(&a.p, axis, &b.p, -INFINITY)
-                                          : edge_separation(&b.p, axis - a.p.count, &a.p, -INFINITY);
-        if (s > best) best = s, *axis_out = axis;
-        if (best > margin) break;
+    for (int k = 0; k < n && !(best > margin); k++) {
+        const int axis = k == 0 ? hint : k <= hint ? k - 1 : k, in_b = axis >= n_a;
+        const edge e = edge_of(&p[in_b].p, in_b ? axis - n_a : axis, &p[!in_b].p, -INFINITY);
+        if (e.s <= best) continue;
+        best = e.s;
+        known->edge[in_b] = (int8_t)e.i;
+        known->edge[!in_b] = -1;
     }
-    *gap_out = best;
+    *gap = best;
     if (best > margin) return false;
 
     *m = (bt_manifold){.a = ia, .b = ib};
     const bounds most = bounds_of(w, margin);
-    best_axes s = {0};
-    s.sa = separation_that_counts(&a, &b, &s.ia);
-    s.sb = separation_that_counts(&b, &a, &s.ib);
-    const bool ref_b = reference_is_b(&a.p, &b.p, &s, tie, reference_before);
-    const double sep = ref_b ? s.sb : s.sa;
-    const part_of_body *ref = ref_b ? &b : &a, *inc = ref_b ? &a : &b;
-    const int edge = ref_b ? s.ib : s.ia;
+    const edge e[2] = {best_that_counts(&p[0], &p[1]), best_that_counts(&p[1], &p[0])};
+    const bool ref = reference_is_b(&e[0], &e[1], tie, reference_before);
+    const double sep = e[ref].s;
     if (best > 0) {
         if (sep > 0 && sep >= best - tie) {
-            clip_what_counts(ref, edge, inc, ref_b, d, most, m);
+            clip_what_counts(&p[ref], &e[ref], &p[!ref], ref, d, most, m);
             if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
         }
-        return nearest_contact(&a, &b, d, most, m);
+        return nearest_contact(&p[0], &p[1], d, most, m);
     }
     if (!(-sep <= bt_max(tie, -DETOUR * best))) return false;
-    clip_what_counts(ref, edge, inc, ref_b, d, most, m);
-    if (m->n_points == 0) deepest_point(&ref->p, edge, &inc->p, ref_b, d[0], d[1], m);
+    clip_what_counts(&p[ref], &e[ref], &p[!ref], ref, d, most, m);
+    if (m->n_points == 0) deepest_point(&p[ref].p, &e[ref], &p[!ref].p, ref, d, m);
     return true;
+}
+
+bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
+                       int reference_before, bt_manifold *m, bt_axes *axes)
+{
+    bt_axes none = BT_NO_AXES, *known = axes ? axes : &none;
+    const bool whole = part[0] == 0 && part[1] == 0 && !bt_shore_holds(w, a) && !bt_shore_holds(w, b);
+    double gap;
+    const bool touch = whole ? bodies_touch(w, a, b, margin, reference_before, m, known, &gap)
+                             : parts_touch(w, a, b, part, margin, reference_before, m, known, &gap);
+    const double reach = gap + w->bodies.path[a] + w->bodies.path[b];
+    known->reach = (float)(reach - 1e-6 * fabs(reach));
+    return touch;
 }

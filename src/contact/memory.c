@@ -9,9 +9,7 @@ bool bt_law_near(const bt_world *w, const bt_memory *r)
 {
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
     bt_manifold m;
-    double gap;
-    int32_t axis = -1;
-    return a >= 0 && b >= 0 && bt_contacts_parts(w, a, b, r->part, BT_LAW_MEMORY * w->par.size, -1, &m, &gap, &axis);
+    return a >= 0 && b >= 0 && bt_contacts_parts(w, a, b, r->part, BT_LAW_MEMORY * w->par.size, -1, &m, NULL);
 }
 
 bt_idx bt_law_find(const bt_cell *t, const bt_memory *names)

@@ -38,14 +38,6 @@ void bt_pack_begin(bt_pack_scratch *s, size_t n)
     s->colour = bt_realloc(s->colour, s->cap, sizeof *s->colour);
 }
 
-bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i)
-{
-    s->pair[s->n] = i;
-    return &s->man[s->n];
-}
-
-void bt_pack_keep(bt_pack_scratch *s) { s->n++; }
-
 /// Position of body i in the block of cell t, −1 = a large one.
 static bt_idx in_block(const bt_cells *ts, const bt_cell *t, const bt_idx base[4], bt_idx i)
 {
@@ -206,7 +198,7 @@ static bt_row_state row_state(const bt_world *w, const bt_cell *t, bt_idx j, con
     return BT_ROW_OPEN;
 }
 
-void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
+__attribute__((flatten)) void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
 {
     bt_cell *t = &w->cells->cell[k];
     hold(t, s);

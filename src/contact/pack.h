@@ -34,9 +34,12 @@ typedef struct bt_pack_scratch {
 
 /// Room for n manifolds, none kept yet.
 void bt_pack_begin(bt_pack_scratch *s, size_t n);
-/// Place for the next manifold, of pair i; it counts once kept.
-bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i);
-void bt_pack_keep(bt_pack_scratch *s);
+/// Place for the next manifold, of pair i; it counts once n is one more.
+static inline bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i)
+{
+    s->pair[s->n] = i;
+    return &s->man[s->n];
+}
 /// The contacts of cell k from the manifolds kept, with the impulses of those in their places (without warm start: 0).
 void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s);
 void bt_pack_scratch_free(bt_pack_scratch *s);

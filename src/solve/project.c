@@ -106,10 +106,9 @@ static void find_left(bt_world *w, bt_idx k, const void *shifted, bt_totals *t)
             if (*(const bool *)shifted) g->gap[i] += bt_normal_velocity(u, i, &d[u->a], &d[u->b]);
         if (!turns(w, cell, j, LEFT * w->par.slop)) continue;
         bt_manifold m;
-        double gap;
         const bt_pair *p = &cell->search.pairs[u->pair];
-        int32_t axis = p->axis;
-        if (!bt_contacts_parts(w, u->a, u->b, p->part, 0, (int)(g->feature[0] >> 31), &m, &gap, &axis)) continue;
+        bt_axes axes = p->axes;
+        if (!bt_contacts_parts(w, u->a, u->b, p->part, 0, (int)(g->feature[0] >> 31), &m, &axes)) continue;
         keep(w->solver, k, j, u);
         bt_pack_rows(w, &m, u);
         for (int i = 0; i < m.n_points; i++) {

@@ -6,22 +6,13 @@
 
 #include <stdint.h>
 
+#include "base/cpu.h"
 #include "bergtow/base.h"
 
 enum { BT_LANES = 4 };
 
 typedef double bt_vec __attribute__((vector_size(BT_LANES * sizeof(double))));
 typedef int64_t bt_mask __attribute__((vector_size(BT_LANES * sizeof(int64_t))));
-
-// One copy of a function for each instruction set that the program is built for, chosen when it starts: by the dynamic
-// linker of glibc (ifunc), which other C libraries have nothing of.
-#if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&    \
-    !defined(__clang__) && defined(__GLIBC__)
-#define BT_FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
-#else
-#define BT_FOR_EACH_CPU
-#endif
-#define BT_INLINE static inline __attribute__((always_inline))
 
 BT_INLINE bt_vec bt_choose(bt_mask m, bt_vec yes, bt_vec no)
 {

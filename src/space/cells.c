@@ -470,8 +470,8 @@ static void put_pair(bt_cell *t, bt_idx a, bt_idx b, const bt_memory *r)
         t->gaps = bt_realloc(t->gaps, (size_t)s->cap_pairs, sizeof *t->gaps);
     }
     const bt_idx at = s->n_pairs++;
-    s->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {r->part[0], r->part[1]}, .axis = -1,
-                             .reach = -INFINITY};
+    s->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {r->part[0], r->part[1]},
+                             .axes = BT_NO_AXES};
     t->contacts[at] = (bt_contact){.n = r->n_points, .ln = {r->value[0], r->value[1]}, .lt = r->value[2]};
     t->gaps[at] = (bt_gaps){.feature = {r->feature[0], r->feature[1]}};
 }

@@ -36,6 +36,7 @@
 #ifndef BERGTOW_CELLS_H
 #define BERGTOW_CELLS_H
 
+#include <math.h>
 #include <stdint.h>
 
 #include "bergtow/sum.h"
@@ -44,18 +45,29 @@
 /// the fifth phase is the cell of the large movable bodies
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
 
+/// The edges of a pair that matter, and until when (contact/manifold.c). Known of them is what the pair was then: where
+/// it has moved to in the meantime follows from its poses, whoever has set them.
+typedef struct bt_axes {
+    float x, y;          ///< from the centroid of a to that of b when they were found, m
+    float room;          ///< motion that makes no other edge matter, m; < 0: they are a guess
+    /// at most the gap then + path lengths of a and b then: no contact while paths + margin < reach
+    float reach;
+    uint16_t turn[2];    ///< yaws of a and b then, in 2^-16 turns
+    int8_t edge[2];      ///< of a and of b that separate the two most; -1: that of the other counts alone, or unknown
+} bt_axes;
+#define BT_NO_AXES {.room = -1, .reach = -INFINITY, .edge = {-1, -1}}
+_Static_assert(BT_MAX_VERTICES <= 128, "an edge in a byte with a sign");
+
 /// A pair near enough to be looked at.
-typedef struct __attribute__((packed, aligned(4))) bt_pair {
+typedef struct bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
     /// that of its points in the cell when last looked for, not of sheets; −1 = none. It hands its features and
     /// impulses on to the contact that takes its place
     bt_idx contact;
     uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
-    int16_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
-    /// gap when last computed + path lengths of a and b then: no contact while paths + margin < reach
-    double reach;
+    bt_axes axes;
 } bt_pair;
-_Static_assert(sizeof(bt_pair) == 28, "a floe in dense ice has four, and each is kept from step to step");
+_Static_assert(sizeof(bt_pair) == 40, "a floe in dense ice has four, and each is kept from step to step");
 
 /// One manifold, in two cache lines: what batches are packed from (solve/batch.h), four contacts at a time, each a line
 /// of four numbers after the other; in the last cell and under rising bounds a sweep reads it itself, and writes the

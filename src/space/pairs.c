@@ -66,7 +66,7 @@ static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int 
     if (*n == s->cap_found)
         s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
     s->found[(*n)++] = (bt_pair){.a = a, .b = b, .contact = -1, .part = {(uint16_t)part_a, (uint16_t)part_b},
-                                 .axis = -1, .reach = -INFINITY};
+                                 .axes = BT_NO_AXES};
 }
 
 /// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.

@@ -170,6 +170,66 @@ static void detect_equals_brute_force(void **state)
     assert_true(total > 10000 && labellings > 14); // and renewed
 }
 
+/// Floes on top of each other, many of them thin: opposite edges of those separate nearly alike.
+static bt_world *heap(uint64_t *rng, int n)
+{
+    const bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[2 * BT_MAX_VERTICES];
+    for (int i = 0; i < n; i++) {
+        const int nv = scene_random_polygon(rng, 0.2 + 0.8 * scene_uniform(rng), v);
+        const double flat = i % 2 ? 0.05 : 1;
+        for (int k = 0; k < nv; k++) v[2 * k + 1] *= flat;
+        bt_body_def d = scene_prism(nv, v, 900);
+        d.x = 2 * scene_uniform(rng), d.y = 2 * scene_uniform(rng), d.yaw = i % 4 < 2 ? 0 : 7 * scene_uniform(rng);
+        bt_world_add(w, &d);
+    }
+    detect_all(w, 0.1);
+    return w;
+}
+
+/// What a pair has kept of its last search changes nothing, however the two have moved; and it spares most searches.
+static void kept_edges_change_nothing(void **state)
+{
+    (void)state;
+    enum { BODIES = 30, PAIRS = BODIES * (BODIES - 1) / 2 };
+    uint64_t rng = 17;
+    int looks = 0, searches = 0, touching = 0;
+    for (int scene = 0; scene < 8; scene++) {
+        bt_world *w = heap(&rng, BODIES);
+        bt_axes kept[PAIRS];
+        int before[PAIRS];
+        for (int k = 0; k < PAIRS; k++) kept[k] = (bt_axes)BT_NO_AXES, before[k] = -1;
+        for (int step = 0; step < 150; step++) {
+            int k = 0;
+            for (bt_gid g = 0; g < BODIES; g++)
+                for (bt_gid h = g + 1; h < BODIES; h++, k++) {
+                    const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
+                    const bt_axes last = kept[k];
+                    bt_manifold m = {0}, want = {0};
+                    const bool touch = bt_contacts_parts(w, i, j, (uint16_t[2]){0}, 0.1, before[k], &m, &kept[k]);
+                    assert_int_equal(touch, bt_contacts_parts(w, i, j, (uint16_t[2]){0}, 0.1, before[k], &want, NULL));
+                    if (touch) assert_memory_equal(&m, &want, sizeof m);
+                    before[k] = touch ? (int)(m.p[0].feature >> 31) : -1;
+                    looks += touch && step > 0;
+                    searches += touch && step > 0 && (kept[k].x != last.x || kept[k].y != last.y);
+                    touching += touch;
+                }
+            // by turns together, along one direction, across it, and turning
+            const double small = 0.05 * pow(scene_uniform(&rng), 3);
+            for (bt_idx i = 0; i < w->bodies.n; i++) {
+                bt_pose *p = &w->bodies.pose[i];
+                p->x += 0.5 + (step % 4 == 1) * small * (scene_uniform(&rng) - 0.5);
+                p->y += (step % 4 == 2) * small * (scene_uniform(&rng) - 0.5);
+                p->yaw += (step % 4 == 3) * small * (scene_uniform(&rng) - 0.5);
+                bt_bodies_turn(&w->bodies, i);
+            }
+        }
+        bt_world_free(w);
+    }
+    assert_true(touching > 100000 && searches < looks / 3);
+}
+
 /// Every separate pair nearer than the margin has a manifold, its least gap is the distance, and none is farther.
 static void gaps_are_distances(void **state)
 {
@@ -237,13 +297,10 @@ static void arms_meet(void **state)
         // Moving b by the normal opens the gap.
         if (m->p[0].gap > 0) {
             bt_manifold after;
-            double gap;
-            int32_t axis = -1;
             const double step = 1e-4;
             w->bodies.pose[m->b].x += step * m->nx;
             w->bodies.pose[m->b].y += step * m->ny;
-            if (bt_contacts_parts(w, m->a, m->b, (uint16_t[2]){0}, 0.2, (int)(m->p[0].feature >> 31), &after, &gap,
-                                  &axis))
+            if (bt_contacts_parts(w, m->a, m->b, (uint16_t[2]){0}, 0.2, (int)(m->p[0].feature >> 31), &after, NULL))
                 CHECK_CLOSE(bt_min(after.p[0].gap, after.p[after.n_points - 1].gap),
                             bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) + step, 1e-7);
             w->bodies.pose[m->b].x -= step * m->nx;
@@ -322,6 +379,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(detect_equals_brute_force),
+        cmocka_unit_test(kept_edges_change_nothing),
         cmocka_unit_test(gaps_are_distances),
         cmocka_unit_test(arms_meet),
         cmocka_unit_test(edge_contact_keeps_its_features),
