@@ -408,9 +408,11 @@ MUTANTS = {
          "bt_laws[r->law]->count(w, r, sums_of(totals, r->law));", "crushed depth is not reported"),
         ("if (bt_laws[law]->rises && bt_law_on(p, law)) return true;", "", "contacts with rising bounds in batches"),
     ]),
-    "src/contact/manifold.c": (["unit/test_contacts", "physics/test_crush", "physics/test_rafting", "physics/test_parts",
+    "src/contact/manifold.c": (["unit/test_contacts", "physics/test_crush", "physics/test_rafting",
+                                "physics/test_parts",
                                 "scenes:rafting,rafting_press,speed_dense,periodic_dense,window"], [
-        ("double reach = gap + w->bodies.path[a]", "double reach = gap + 2 * w->bodies.path[a]", "the reach is too long"),
+        ("double reach = gap + w->bodies.path[a]", "double reach = gap + 2 * w->bodies.path[a]",
+         "the reach is too long"),
         ("(float)(0.5 * bt_max(both, alone))", "(float)bt_max(both, alone)", "edges are kept for twice the room"),
         ("fabsf(now->x - k->x) + fabsf", "fabsf", "edges are kept whatever the way along x"),
         (" + (float)turn * (float)UNIT * arm", "", "edges are kept whatever the turn"),
