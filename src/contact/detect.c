@@ -203,15 +203,7 @@ static void narrow_phase(bt_world *w, bt_idx k, const void *scratch, bt_totals *
     }
     if (several) merge(w, t, &s->pack);
     if (t->laws.n_memory > 0) replace(w, t, &s->pack);
-    t->n_points = 0;
-    t->overlap = 0;
-    for (size_t i = 0; i < s->pack.n; i++) {
-        const bt_manifold *m = &s->pack.man[i];
-        t->n_points += m->n_points;
-        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
-    }
     bt_pack_contacts(w, k, &s->pack);
-    if (bt_laws_on(&w->par)) t->overlap = bt_laws_overlap(t); // what has given way does not count as overlap
 }
 
 static void wake_body(bt_world *w, bt_idx i)

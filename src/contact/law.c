@@ -103,16 +103,6 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     }
 }
 
-double bt_laws_overlap(const bt_cell *t)
-{
-    // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it
-    // alone.
-    double deepest = 0;
-    for (bt_idx j = 0; j < t->n_contacts; j++)
-        for (int i = 0; i < t->contacts[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);
-    return deepest;
-}
-
 // --- growth ----------------------------------------------------------------------------------------------------------
 
 /// Sums of the numbers of a law; those of added laws come first.

@@ -175,9 +175,6 @@ void bt_laws_reserve(bt_cell *t);
 /// Bounds of contact j of cell t, made from manifold m of pair p.
 void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
 
-/// Deepest overlap in a cell of what is left of the outlines, m.
-double bt_laws_overlap(const bt_cell *t);
-
 /// Collective. After the solve: what gives way, into the records; work, numbers and depths into stats.
 void bt_laws_grow(bt_world *w);
 

@@ -302,14 +302,15 @@ BT_INLINE bt_axes place_of(const bt_bodies *b, bt_idx i, bt_idx j, const double 
 BT_INLINE float motion(const bt_axes *k, const bt_axes *now, float radius)
 {
     const int turn = abs((int16_t)(now->turn[0] - k->turn[0])) + abs((int16_t)(now->turn[1] - k->turn[1])) + ROUNDED;
-    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * (float)UNIT * (fabsf(k->x) + fabsf(k->y) + radius);
+    const float arm = fabsf(k->x) + fabsf(k->y) + radius;
+    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * (float)UNIT * arm;
 }
 
 /// The edges e of a and b that separate the two most. False as soon as one separates by more than the margin. Those of
 /// the last search usually do so again, or are the best for certain (motion). Where not, an edge that separates by less
 /// than they, and by more than the tie, is neither the best nor in question. An edge that does not count has s = -∞.
-BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius, const bt_axes *now,
-                      bt_axes *k, edge e[2])
+BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius,
+                         const bt_axes *now, bt_axes *k, edge e[2])
 {
     e[0] = k->edge[0] >= 0 ? edge_of(a, k->edge[0], b, -INFINITY) : (edge){-INFINITY, .i = -1};
     e[1] = k->edge[1] >= 0 ? edge_of(b, k->edge[1], a, -INFINITY) : (edge){-INFINITY, .i = -1};

@@ -208,6 +208,8 @@ __attribute__((flatten)) void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_sc
         t->gaps = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->gaps);
     }
     t->n_contacts = (bt_idx)s->n;
+    t->n_points = 0;
+    t->overlap = 0;
     bt_cells_make_room(t, s->n * sizeof *t->contacts);
     if (s->n == 0) return;
     const bool bounded = bt_laws_on(&w->par);
@@ -229,5 +231,9 @@ __attribute__((flatten)) void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_sc
         if (bounded) bt_laws_bound(w, t, at, p, &s->man[i]); // the gaps may be others after it
         bt_pack_set_row(w, t, at, row_state(w, t, at, &s->man[i], &s->held[i]));
         p->contact = at;
+        t->n_points += u->n;
+        // Of what is left of the outlines. 0 − gap, not −gap: a contact that just touches must not make the deepest
+        // overlap −0 on the one rank that holds it alone.
+        for (int j = 0; j < u->n; j++) t->overlap = bt_max(t->overlap, 0 - t->gaps[at].gap[j]);
     }
 }

@@ -172,7 +172,7 @@ typedef struct bt_cell {
     bt_gaps *gaps;                  ///< of the contacts
     bt_idx n_contacts, cap_contacts;
     int64_t n_points;
-    double overlap;                 ///< deepest, m
+    double overlap;                 ///< deepest, m; what has given way does not count
     bt_law_state laws;
     bt_work_list work;
 } bt_cell;
