@@ -344,6 +344,13 @@ def store(binary, scenes):
                       f'"items": {json.dumps(items, indent=0)},\n"scenes": {{\n' + ",\n".join(lines) + "\n}\n}\n")
 
 
+def departed(name, items):
+    """(gone, new, changed): items of a run of a scene beside what is stored of it."""
+    want, found = stored()[1][name], digests(items)
+    return (sorted(want.keys() - found.keys()), sorted(found.keys() - want.keys()),
+            sorted(i for i in want if i in found and want[i] != found[i]))
+
+
 def record(names):
     binary, scenes = stored() if names else (version(BERGTOW), {})
     for name in names or SCENES:
