@@ -159,7 +159,7 @@ class Ensemble:
         self._dropped = {}
 
     def _read(self):
-        fault = soundness.broken_seal(self.file, "ensemble 2") if soundness.available() else None
+        fault = soundness.broken_seal(self.file, "ensemble 3") if soundness.available() else None
         if fault:
             raise RunError(self.file, fault, "run `bergtow ensemble` again: it makes the file anew")
         with h5py.File(self.file, "r") as f:

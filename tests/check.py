@@ -14,6 +14,7 @@ import concurrent.futures
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -116,6 +117,7 @@ def ready(tests):
 
 
 def main(files):
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it, and so would tests
     jobs = [("lint", lambda: called(["tests/lint.sh", "changed"]))]
     if files:
         tests = parted(t for f in files for t in nearest(f))

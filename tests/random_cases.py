@@ -77,7 +77,6 @@ FREE = {
     "solver.tolerance": (1e-5, 1e-1, ""),
     "solver.max_sweeps": (10, 500, ""),
     "solver.inner_sweeps": (1, 10, "l"),
-    "solver.turn_rows": (1, 1e5, "l"),
     "solver.tile": (2, 10, "lm"),
     "solver.plain": None,
     "solver.plain_schedule": None,

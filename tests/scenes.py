@@ -127,7 +127,7 @@ SCENES = {
     "plain_schedule": changed(DENSE, solver__plain_schedule=True, ice__restitution=0.2),
     "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
     "few_sweeps": changed(CLOSING, run__duration=1.5),
-    "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "turn_rows": 50, "slop": 5e-3,
+    "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "slop": 5e-3,
                                               "position_sweeps": 1, "rest_speed": 0.05},
                                ice__restitution=0.4, tow__speed=0.5),
     "guards_wide": changed(CLOSING, run__duration=0.7,

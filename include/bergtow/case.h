@@ -72,7 +72,6 @@ typedef struct bt_floe_def {
     int line;                  ///< where in the case file it stands, for messages
 } bt_floe_def;
 
-enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
 
 enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
 
@@ -216,7 +215,6 @@ typedef struct bt_case {
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
         int64_t inner_sweeps;    ///< sweeps of a cell in its turn
-        int64_t turn_rows;       ///< without effect, of cases written for earlier versions
         double cell;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool plain_schedule;     ///< passes by one thread (space/phases.h)

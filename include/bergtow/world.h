@@ -178,8 +178,7 @@ struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
 
-/// Where the wall time of a run goes: X(name, what is in it). The last was added later: older checkpoints do not have
-/// it.
+/// Where the wall time of a run goes: X(name, what is in it).
 #define BT_WALL_PHASES(X)                                                                                              \
     X(detect, "labels and storage of bodies, margins, the detection of contacts")                                      \
     X(colour, "the order of the cells by their colours, and their distribution to threads")                            \

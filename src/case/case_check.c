@@ -299,8 +299,7 @@ static void check_outlines(const check *k)
         bt_check_fault(k, "ice.origin_east",
               "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
               "ice.outlines_crs: plane");
-    // Every resolved case of before has metres, with outlines or without.
-    if (crs != BT_CRS_FILE && crs != BT_CRS_METRES && !c->ice.outlines)
+    if (crs != BT_CRS_FILE && !c->ice.outlines)
         bt_check_fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
     if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
         bt_check_fault(k, "ice.nonconvex",

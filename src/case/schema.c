@@ -403,9 +403,6 @@ bt_key bt_case_keys[] = {
         "far off; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
         "times a cell that still changes is swept before the next has its turn"),
-    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",
-        "without effect: sweeps no longer follow each other through large fields; accepted in cases written for "
-        "earlier versions, and to be taken out"),
     REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]",
          "least side of the cells / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false",

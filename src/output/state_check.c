@@ -249,12 +249,12 @@ static void check_undisturbed(const bt_world *w, bt_snapshot *s)
     const bt_undisturbed *v = w->undisturbed;
     const double real[] = {v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
     bt_snapshot_want(s, bt_state_finite(real, sizeof real / sizeof *real),
-                     w->window ? "window/drift_x" : "undisturbed/drift_x", -1,
+                     "undisturbed/drift_x", -1,
                      "and what else belongs to undisturbed ice are not all finite");
     if (!w->window) return;
-    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
-    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
-                     "is out of range");
+    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "undisturbed/drift_x", -1, "is out of range");
+    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "undisturbed/drift_y",
+                     -1, "is out of range");
 }
 
 static bool is_gid(double x, bt_gid n) { return x >= 0 && x < (double)n && x == floor(x); }

@@ -556,12 +556,3 @@ def test_drift_with_the_current(tmp_path):
     assert vy[-1] / vx[-1] == pytest.approx(-2, rel=1e-6)
     assert 0.15 < vx[-1] < 0.2
     assert floe[1] / floe[0] == pytest.approx(-2, rel=1e-6)
-
-
-def test_a_key_of_earlier_versions_has_no_effect(tmp_path):
-    """Cases, and resolved cases in result folders, that name solver.turn_rows still run."""
-    short = changed(TOW, run__duration=2)
-    old = run(tmp_path, changed(short, solver__turn_rows=1), name="old")
-    new = run(tmp_path, short, name="new")
-    assert old.summary["state_hash"] == new.summary["state_hash"]
-    assert warned(old, "turn_rows no longer has an effect; take it out") and not warned(new, "turn_rows")

@@ -127,7 +127,7 @@ static const struct change {
     {1, "bodies/lap", 2, 2147483647, NULL},
     {1, "bodies/copy", 2, -2147483648.0, NULL},
     {1, "window/rear_in_ice", 0, NAN, NULL},
-    {1, "window/drift_x", 0, 1e300, NULL},
+    {1, "undisturbed/drift_x", 0, 1e300, NULL},
     {1, "window/renewed", 0, -1, NULL},
 };
 enum { N_CASES = sizeof cases / sizeof *cases, N_CHANGES = sizeof changes / sizeof *changes };
