@@ -183,7 +183,6 @@ SCENES = {
     "outlines_frame": changed(SHORT, domain={"length": 15, "width": 8, "x0": 0, "y0": -4, "frame": "geographic",
                                                  "ends": "wall", "sides": "wall"}, ice={
         "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
-    "outlines_metres": changed(SHORT, ice={"outlines": "frame.geojson", "outlines_crs": "metres", "nonconvex": "hull"}),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
     "output_settings": changed(SHORT, run__title="samples of three steps", report={
         "client": "a", "project": "b", "author": "c", "revision": "d"}, output={

@@ -21,7 +21,7 @@ typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING 
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
 /// Coordinates of outlines: file, lonlat, plane, frame, metres.
-typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME, BT_CRS_METRES } bt_crs;
+typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME } bt_crs;
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_START_DRIFT, BT_START_REST } bt_start;                           // drift, rest
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal

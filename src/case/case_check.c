@@ -295,7 +295,7 @@ static void check_outlines(const check *k)
     if (c->ice.outlines && lon && crs != BT_CRS_FILE && crs != BT_CRS_LONLAT)
         bt_check_fault(k, "ice.origin_lon",
               "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin");
-    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME || crs == BT_CRS_METRES))
+    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME))
         bt_check_fault(k, "ice.origin_east",
               "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
               "ice.outlines_crs: plane");

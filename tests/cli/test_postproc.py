@@ -367,7 +367,7 @@ def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
         assert plot_force.findings(run).startswith("mean over the window: ice resistance 10.00 N")
         assert "shaded: window 3" in " ".join(t.get_text() for t in figure.texts)
         assert report_run.figures(run)[0][0] == "ice resistance, mean over the window"
-    del summary["window"]["verdict"]  # a result of an earlier version
+    del summary["window"]["verdict"]  # as without a towed body
     (folder / "summary.json").write_text(json.dumps(summary))
     with Run(folder) as run:
         assert run.verdict[0] == "not judged" and run.mean_name == "mean over the window"

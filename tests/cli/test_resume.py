@@ -249,8 +249,7 @@ def opened_to_change_it(path):
 
 
 def of_an_earlier_format(path):
-    seal = b"bergtow sealed file\nkind: checkpoint 2\nbytes: 9\n"
-    path.write_bytes(seal.ljust(512, b"\0") + path.read_bytes()[:-128])
+    path.write_bytes(re.sub(rb"kind: checkpoint \d+", b"kind: checkpoint 4", path.read_bytes()))
 
 
 ENDS = {
@@ -263,7 +262,7 @@ ENDS = {
     "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
     "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is no checkpoint file of this program"),
     "empty": (lambda path: path.write_bytes(b""), "is no checkpoint file of this program"),
-    "earlier": (of_an_earlier_format, r'has the format "checkpoint 2", this program reads "checkpoint \d+"'),
+    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", this program reads "checkpoint \d+"'),
 }
 
 
