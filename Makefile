@@ -313,7 +313,7 @@ $(STUDY): partition/study/partition_quality.c $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  LINK $@'
 	@$(CC) $(CFLAGS) $< $(BUILD)/libbergtow.a $(LDLIBS) -o $@
 
-partition-study: $(STUDY) ## cut tile graphs of a million floes into up to 4,096 parts: partition/quality.csv
+partition-study: $(STUDY) ## cut cell graphs of a million floes into up to 4,096 parts: partition/quality.csv
 	$(STUDY) > partition/quality.csv.new
 	mv partition/quality.csv.new partition/quality.csv
 

@@ -77,7 +77,7 @@ FREE = {
     "solver.tolerance": (1e-5, 1e-1, ""),
     "solver.max_sweeps": (10, 500, ""),
     "solver.inner_sweeps": (1, 10, "l"),
-    "solver.tile": (2, 10, "lm"),
+    "solver.cell_size": (2, 10, "lm"),
     "solver.plain": None,
     "solver.plain_schedule": None,
     "solver.warm_start": None,

@@ -125,7 +125,7 @@ SCENES = {
     "open_sides": changed(DENSE, domain__sides="open", domain__ends="open", water__current_y=0.1),
     "plain_sweeps": changed(DENSE, solver__plain=True, solver__max_sweeps=60),
     "plain_schedule": changed(DENSE, solver__plain_schedule=True, ice__restitution=0.2),
-    "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
+    "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__cell_size=3),
     "few_sweeps": changed(CLOSING, run__duration=1.5),
     "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "slop": 5e-3,
                                               "position_sweeps": 1, "rest_speed": 0.05},

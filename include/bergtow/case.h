@@ -215,7 +215,7 @@ typedef struct bt_case {
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
         int64_t inner_sweeps;    ///< sweeps of a cell in its turn
-        double cell;             ///< least side of a cell / mean floe size
+        double cell_size;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool plain_schedule;     ///< passes by one thread (space/phases.h)
         bool warm_start;

@@ -203,8 +203,8 @@ typedef struct bt_step_stats {
     int64_t sweeps, position_sweeps;
     int64_t position_updates; ///< of contacts by the sweeps of the position projection
     bool projected;          ///< the position projection came to its end, or there was nothing to do
-    int64_t unit_updates;    ///< of contacts by the sweeps
-    int64_t unit_moves;      ///< of contacts by momentum between sweeps
+    int64_t contact_updates;    ///< of contacts by the sweeps
+    int64_t contact_moves;      ///< of contacts by momentum between sweeps
     int64_t residual_checks; ///< of contacts by residual passes, and by velocities formed anew for them
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed

@@ -402,7 +402,7 @@ bt_key bt_case_keys[] = {
         "far off; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
         "times a cell that still changes is swept before the next has its turn"),
-    REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]",
+    REAL("solver.cell_size", solver.cell_size, RATIO, "5", "[2, 100]",
          "least side of the cells / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false",
          "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of "

@@ -30,7 +30,7 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged),
     COLUMN(BT_COL_RESIDUAL, "residual", residual),
     COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
-    COLUMN(BT_COL_QUASI_STATIC, "push", largest_push),
+    COLUMN(BT_COL_QUASI_STATIC, "quasi_static", largest_quasi_static_load),
     COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice),
     COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice),
     COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water),
@@ -59,7 +59,7 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
 static const bt_total totals[] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
-    TOTAL(F64, sum_updates, SUM, unit_updates),
+    TOTAL(F64, sum_updates, SUM, contact_updates),
     TOTAL(F64, sum_moves, SUM, momentum_moves),
     TOTAL(F64, sum_checks, SUM, residual_checks),
     TOTAL(F64, sum_projected, SUM, position_updates),

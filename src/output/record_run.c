@@ -2,9 +2,9 @@
 // Is the result in a folder of the run that a checkpoint is of? A checkpoint that was kept while another run took the
 // folder, or comes from another folder, would go on in a result whose beginning is not its own.
 //
-// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Runs that
-// began alike may have been led apart by a program; and so the series, too, are compared with the history that the
-// checkpoint keeps of every step.
+// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Runs
+// that began alike may have been led apart by a program; and so the series, too, are compared with the history that
+// the checkpoint keeps of every step.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

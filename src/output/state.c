@@ -170,9 +170,9 @@ typedef struct {
 /// Its columns in the file.
 static const bt_state_row body_columns[] = {
     MEMBER(body_row, "pose", F64, 3, pose),         MEMBER(body_row, "velocity", F64, 3, vel),
-    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "tile", I32, 2, cell),
+    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "cell", I32, 2, cell),
     MEMBER(body_row, "copy", I32, 1, copy),         MEMBER(body_row, "lap", I32, 1, lap),
-    MEMBER(body_row, "stirred", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
+    MEMBER(body_row, "disturbed", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -296,7 +296,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     assert(w->bodies.n == n); // nothing is distributed yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++) {
-        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/stirred", g,
+        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/disturbed", g,
                          "is neither 0 nor 1");
         put_row(w, bt_world_index(w, g), &rows[g]);
     }
@@ -425,7 +425,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
     bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
+    bt_snapshot_add_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->undisturbed)
@@ -495,7 +495,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
     load_bodies(w, s);
-    bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
+    bt_snapshot_take_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->undisturbed)
