@@ -111,7 +111,8 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
         f.create_dataset("bodies/names", data=["towed body", "wall y low"], dtype=h5py.string_dtype())
     summary = {"title": "Square", "n_floes": 2, "n_steps": n, "concentration": 0.8, "mean_ice_resistance_n": 10.0,
                "mean_ice_resistance_se_n": 0.5,
-               "mean_ice_resistance_low_n": 10 - 0.98, "mean_ice_resistance_high_n": 10 + 0.98, "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
+               "mean_ice_resistance_low_n": 10 - 0.98, "mean_ice_resistance_high_n": 10 + 0.98,
+               "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
                "window": {"start_s": 3.0, "end_s": 10.0, "verdict": "steady", "reasons": []},
                "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None,
                "warnings": [{"code": "overlap", "text": f"{n} doubt", "values": {}}
