@@ -187,8 +187,8 @@ static void cut_map(bt_world *w)
     MPI_Bcast(&d->stats.cut, 1, MPI_DOUBLE, 0, d->comm->mpi);
     MPI_Bcast(&fresh, 1, MPI_DOUBLE, 0, d->comm->mpi);
     if (d->distributed) { // the first division knew no work yet
-        d->stats.dealt_imbalance += fresh;
-        d->stats.worst_dealt_imbalance = bt_max(d->stats.worst_dealt_imbalance, fresh);
+        d->stats.repartition_imbalance += fresh;
+        d->stats.worst_repartition_imbalance = bt_max(d->stats.worst_repartition_imbalance, fresh);
     }
     d->stats.divisions++;
 }

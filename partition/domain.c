@@ -60,7 +60,7 @@ bt_domain_stats bt_domain_get_stats(const bt_world *w)
 {
     bt_domain_stats s = w->domain ? w->domain->stats : (bt_domain_stats){0};
     if (s.checks > 0) s.imbalance /= (double)s.checks;
-    if (s.divisions > 1) s.dealt_imbalance /= (double)(s.divisions - 1);
+    if (s.divisions > 1) s.repartition_imbalance /= (double)(s.divisions - 1);
     return s;
 }
 

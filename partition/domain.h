@@ -20,8 +20,8 @@ typedef struct bt_domain_stats {
     double worst_imbalance;  ///< largest of them
     int64_t checks;
     /// the same of the work that a division was made from, just after it: mean of those after the first division
-    double dealt_imbalance;
-    double worst_dealt_imbalance;
+    double repartition_imbalance;
+    double worst_repartition_imbalance;
     double cut;              ///< share of neighbouring cell pairs that lie on different ranks, last division
     double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
     int64_t moved;           ///< bodies that went to another rank

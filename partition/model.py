@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Efficiency on up to 1,000 ranks: measured compute, cut tile graphs (quality.csv), latency and bandwidth of a network.
+"""Efficiency on up to 1,000 ranks: measured compute, cut cell graphs (quality.csv), latency and bandwidth of a network.
 
 Time of one step on P ranks with N floes, in the terms of README.md:
 
@@ -36,7 +36,7 @@ def options():
     p.add_argument("--ghost", type=float, default=500, help="ns a ghost floe and step (default: %(default)s)")
     p.add_argument("--alpha", type=float, default=1.5, help="latency of a message, us (default: %(default)s)")
     p.add_argument("--beta", type=float, default=12, help="bandwidth of a rank, GB/s (default: %(default)s)")
-    p.add_argument("--tile", type=float, default=4, help="side of a tile in floe diameters (default: %(default)s)")
+    p.add_argument("--cell", type=float, default=4, help="side of a cell in floe diameters (default: %(default)s)")
     return p.parse_args()
 
 
@@ -77,15 +77,15 @@ def main():
     o = options()
     try:
         with open(o.table, newline="") as f:
-            rows = [r for r in csv.DictReader(f) if float(r["tile_diameters"]) == o.tile and int(r["parts"]) <= 1024]
+            rows = [r for r in csv.DictReader(f) if float(r["cell_diameters"]) == o.cell and int(r["parts"]) <= 1024]
     except (OSError, KeyError, ValueError) as error:
         sys.exit(f"model: {o.table}: {error}; make it with `make partition-study`")
     for series, title in (("strong", "Strong scaling, 1,000,000 floes"), ("weak", "Weak scaling, 10,000 floes a rank")):
         chosen = [r for r in rows if r["series"] == series]
         if not chosen or int(chosen[0]["parts"]) != 1:
-            sys.exit(f"model: {o.table}: no {series} rows from one part on with tiles of {o.tile:g} diameters; "
-                     "choose --tile 4, 6 or 8, or make the table with `make partition-study`")
-        print(f"{title} (tiles of {o.tile:g} floe diameters; columns to the right: share of T)\n")
+            sys.exit(f"model: {o.table}: no {series} rows from one part on with cells of {o.cell:g} diameters; "
+                     "choose --cell 4, 6 or 8, or make the table with `make partition-study`")
+        print(f"{title} (cells of {o.cell:g} floe diameters; columns to the right: share of T)\n")
         table(chosen, o, series == "strong")
         print()
 

@@ -104,26 +104,21 @@ class Estimate:
 
     @property
     def compares(self):
-        """A run is held against it: it is valid, and knows the concentration. Results of earlier versions do not say
-        the second."""
-        return bool(self.numbers.get("compares", self.valid and not self.on_top)) and self.force > 0
+        """A run is held against it: it is valid, and knows the concentration."""
+        return bool(self.numbers.get("compares")) and self.force > 0
 
 
 def estimates_of(summary):
     """{name: Estimate} of a summary, in the order of the program's registry; {} where there are none."""
-    found, labels = summary.get("estimates"), summary.get("estimate_labels") or {}
+    found, labels = summary.get("estimates"), summary.get("estimate_labels")
     found = found if isinstance(found, dict) else {}
     out = {}
     for name, numbers in found.items():
         if not (isinstance(numbers, dict) and "force_n" in numbers):
             continue  # a condition, or the curves
-        # An earlier version gives no labels; what comes on top has no ratio there, though it has a force.
-        about = labels.get(name) or {
-            "kind": "on top" if numbers["force_n"] and numbers.get("simulated_over_estimate") is None else ""
-        }
-        out[name] = Estimate(name,
-                             about.get("label") or name.replace("_", " "),
-                             about.get("kind") == "on top", bool(about.get("uses_floe_size")), numbers)
+        about = labels[name]
+        out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
+                             numbers)
     return out
 
 
@@ -313,10 +308,6 @@ class Run:
         """Names of the series with one of these roles ("balance", "force", "load", "diagnostic"), in the order of the
         program's registry."""
         attributes = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
-        # of an earlier version: the forces go by their names
-        if not any("role" in a for a in attributes.values()):
-            return sorted((n for n in attributes if n.endswith("_force") or n == "ice_resistance"),
-                          key=lambda n: (n != "tow_force", n != "ice_resistance", n)) if "balance" in roles else []
         return sorted((n for n in attributes if _plain(attributes[n].get("role", "")) in roles),
                       key=lambda n: int(attributes[n]["order"]))
 
@@ -423,13 +414,8 @@ class Run:
 
     def interval(self, key):
         """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;
-        NaN where it is not known.
-
-        Results of earlier versions have a standard error and no interval: there low and high are 1.96 of them off.
-        """
-        mean, se = self.number(f"mean_{key}_n"), self.number(f"mean_{key}_se_n")
-        return mean, self.number(f"mean_{key}_low_n",
-                                 mean - 1.96 * se), self.number(f"mean_{key}_high_n", mean + 1.96 * se)
+        NaN where it is not known."""
+        return tuple(self.number(f"mean_{key}_{which}n") for which in ("", "low_", "high_"))
 
     def number(self, key, default=np.nan):
         """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""

@@ -55,8 +55,7 @@ def _numerics(found):
     n, mean = found["numerics"], abs(found["mean"])
     if not n or "refused" in n:
         return [["numerics", "not known" if n else "not studied", *[""] * 5]]
-    # a file of an earlier program does not say what is not in it
-    bound = "at most " if n.get("unknown") == {} else ""
+    bound = "" if n["unknown"] else "at most "
     known = n["sd"] is not None and np.isfinite(n["sd"])
     out = [["numerics", bound + _force(found, n["sd"]) if known else "not known",
             _percent(n["sd"] / mean) if known else "", _percent(n["share"]) if known else "", "", "", ""]]

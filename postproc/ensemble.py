@@ -118,7 +118,7 @@ def drift(e, rows, mean):
     """Does the mean of all fields change over the window (stat_drift.py)?"""
     found = stat_drift.of([e.number("window_series_ice_resistance_change_n", m) for m in rows if not e.cut(m)], mean)
     if found is None:
-        return {"verdict": "not judged", "words": "too few fields, or results of an earlier version"}
+        return {"verdict": "not judged", "words": "too few fields"}
     change, (low, high), moved = found
     factor, unit = scale([abs(change)], "N")
     words = (

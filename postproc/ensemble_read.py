@@ -159,7 +159,7 @@ class Ensemble:
         self._dropped = {}
 
     def _read(self):
-        fault = soundness.broken_seal(self.file, "ensemble 2") if soundness.available() else None
+        fault = soundness.broken_seal(self.file, "ensemble 3") if soundness.available() else None
         if fault:
             raise RunError(self.file, fault, "run `bergtow ensemble` again: it makes the file anew")
         with h5py.File(self.file, "r") as f:
@@ -225,19 +225,12 @@ class Ensemble:
     @cached_property
     def estimates(self):
         """{name: {"label", "on_top"}} of the estimates in the members' summaries, in the order of the program's
-        registry.
-
-        The file says of each force which estimate it is of; of an earlier version the names of the columns do, and what
-        comes on top has no ratio there.
-        """
+        registry."""
         forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
         out = {}
         for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
-            meaning, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
-            without_ratio = f"estimates_{name}_simulated_over_estimate" not in self.summary
-            on_top = meaning["kind"] == "on top" if "kind" in meaning else without_ratio
-            label = meaning.get("label", name.replace("_", " "))
-            out[meaning.get("estimate", name)] = {"label": label, "on_top": on_top}
+            meaning = self.meaning[key]
+            out[meaning["estimate"]] = {"label": meaning["label"], "on_top": meaning["kind"] == "on top"}
         return out
 
     @property

@@ -61,14 +61,14 @@ def filler(run):
 
 def _floe_force(run):
     """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
-    if not {"largest_push", "impact_peak"} <= set(run.series_names):
+    if not {"largest_quasi_static_load", "impact_peak"} <= set(run.series_names):
         return None
-    push, peak = run["largest_push"], run["impact_peak"]
+    push, peak = run["largest_quasi_static_load"], run["impact_peak"]
     if not (np.isfinite(push).any() and np.isfinite(peak).any()):
         return None
     conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
     push = filler(run)(push)
-    return Load("floe_force", "force of one floe", run.units("largest_push"),
+    return Load("floe_force", "force of one floe", run.units("largest_quasi_static_load"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
                 refused=f"of every {steps} steps the largest alone was kept; set output.sample_every: 1"

@@ -121,7 +121,7 @@ def draw_exceedance(axes, run):
     style.logarithmic(axes.xaxis, axes.yaxis)
     axes.plot(peaks, rate, color=PEAK, drawstyle="steps-post", linewidth=1.2)
     axes.plot(peaks[:20], rate[:20], ".", color=PEAK, markersize=5)
-    push = run.number("impacts.largest_push_n")
+    push = run.number("impacts.largest_quasi_static_load_n")
     if np.isfinite(push) and push > 0:
         axes.axvline(push, color=LARGEST, linestyle="--", linewidth=1.2)
         axes.annotate(f"largest quasi-static load of a floe {style.quantity(push, 'N')}", (push, 0.97),

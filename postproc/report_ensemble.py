@@ -311,7 +311,7 @@ NOT_STUDIED = {
 
 def doubt(name, found, folder, texts):
     """Why what a command found is not of these members (texts: compared.cases of them), or no longer of the ensemble
-    in its folder; "" where it is. What does not say of what it is has no doubt: the files of earlier programs."""
+    in its folder; "" where it is."""
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
     if name == "converge" and (at := compared.alone(found, texts)):

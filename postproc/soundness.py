@@ -73,7 +73,7 @@ def _of_file(path, seal=0):
 
 
 def broken_seal(path, kind):
-    """Why a sealed file of this kind ("ensemble 2") is not what the program wrote, or None. Errors: OSError."""
+    """Why a sealed file of this kind ("ensemble 3") is not what the program wrote, or None. Errors: OSError."""
     size, found = _of_file(path, SEAL_BYTES)
     with open(path, "rb") as f:
         f.seek(size)

@@ -19,7 +19,7 @@ def assert_counted_over_the_window(run):
         rows = {name: d[:] for name, d in f["impacts"].items()}
         series = {
             name: f["series"][name][:]
-            for name in ("time", "ice_resistance", "collision_resistance", "largest_push")
+            for name in ("time", "ice_resistance", "collision_resistance", "largest_quasi_static_load")
         }
         panels, attributes = {name: d[:] for name, d in f["panels"].items()}, dict(f["panels"].attrs)
     late, steps = (rows["time"] >= start) & (rows["time"] <= end), (series["time"] >= start) & (series["time"] <= end)
@@ -48,13 +48,13 @@ def assert_counted_over_the_window(run):
     assert [(e["rank"], e["peak_n"]) for e in summary["exceedance"]] == [(r, ordered[r - 1]) for r in ranks]
     assert [e["per_hour"] for e in summary["exceedance"]] == pytest.approx([r / hours for r in ranks])
     # Of steps.
-    push = series["largest_push"]
-    assert summary["largest_push_n"] == push[steps].max() and summary["start_largest_push_n"] == (push[~steps].max() if
-                                                                                                  (~steps).any() else
-                                                                                                  None)
+    load = series["largest_quasi_static_load"]
+    assert summary["largest_quasi_static_load_n"] == load[steps].max()
+    before = load[~steps].max() if (~steps).any() else None
+    assert summary["start_largest_quasi_static_load_n"] == before
     collision, ice = series["collision_resistance"][steps].mean(), series["ice_resistance"][steps].mean()
     assert summary["mean_collision_resistance_n"] == pytest.approx(collision, rel=1e-9, abs=1e-9)
-    assert summary["mean_push_resistance_n"] == pytest.approx(ice - collision, rel=1e-9, abs=1e-9)
+    assert summary["mean_quasi_static_resistance_n"] == pytest.approx(ice - collision, rel=1e-9, abs=1e-9)
     # By panel.
     load, force, n = panels["load"], panels["force"], panels["load"].shape[1]
     np.testing.assert_allclose(panels["mean_load"], load[steps].mean(axis=0), rtol=1e-12)

@@ -83,7 +83,7 @@ def has(case):
 
 #: contact forces on the body, NaN in steps without a load
 NO_NUMBERS = ("ice_resistance", "ice_force_x", "ice_force_y", "ice_moment", "ice_resistance_budget", "tow_force",
-              "largest_push")
+              "largest_quasi_static_load")
 
 
 def judge_result(case, folder, whole=True):

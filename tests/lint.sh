@@ -3,6 +3,9 @@
 # House rules that a machine can check: names of external symbols, licence lines, include guards, layers, comments of
 # public functions, length of lines, and what cppcheck, shellcheck, pyflakes and mypy find. A checker that is not
 # installed is left out and named; where CI=true it must be there. clang-tidy takes minutes: make tidy.
+#
+# lint.sh changed: files that differ from the branch main, or from the last commit where there is none, alone; rules
+# between files are held by all.
 bad=0
 complain() { echo "lint: $*"; bad=1; }
 have() {
@@ -23,7 +26,13 @@ ends=$(nm -A -u $lib 2>/dev/null | sed -n 's/^[^:]*:\([^:]*\): *U \(exit\|_exit\
 [ -z "$ends" ] || complain "the library ends the program: $ends"
 
 # Names without blanks; what is new and not yet in git is looked at, too.
-files() { git ls-files --cached --others --exclude-standard "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
+base=
+if [ "${1:-}" = changed ]; then base=$(git merge-base main HEAD 2>/dev/null || git rev-parse HEAD); fi
+listed() {
+    if [ -z "$base" ]; then git ls-files --cached --others --exclude-standard "$@"
+    else git diff --name-only "$base" -- "$@"; git ls-files --others --exclude-standard "$@"; fi
+}
+files() { listed "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
 
 for f in $(files '*.c' '*.h' '*.py' '*.sh' '*.js' '*.css' '*.html' Makefile .ci/run .clang-tidy); do
     head -3 "$f" | grep -q 'SPDX-License-Identifier: MIT' || complain "$f: no SPDX line among the first three"
@@ -31,12 +40,15 @@ done
 for f in $(files '*.h'); do
     grep -q '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f" || complain "$f: no include guard BERGTOW_..._H or BT_..._H"
 done
-twice=$(files '*.h' | while read -r f; do grep -m 1 '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f"; done | sort | uniq -d)
+guards=$(git ls-files --cached --others --exclude-standard '*.h' | while read -r f; do
+    grep -sm 1 '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f"
+done)
+twice=$(echo "$guards" | sort | uniq -d)
 [ -z "$twice" ] || complain "include guards of two headers: $twice"
 python=${PYTHON:-/usr/bin/python3}
-for f in $(files '*.py'); do
-    "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
-done
+# shellcheck disable=SC2046 # one word a file
+"$python" -c "import ast, sys
+for f in sys.argv[1:]: ast.parse(open(f).read(), f)" $(files '*.py') || complain "not Python: see above"
 "$python" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
 "$python" tests/documented.py include/bergtow/*.h || complain "public headers: see above"
 "$python" tests/mutants.py || complain "mutants: their texts have to follow the sources"
@@ -47,21 +59,25 @@ done
     complain "lines of more than 120 characters: see above"
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
-# shellcheck disable=SC2046 # one word a file
-if have shellcheck; then
-    shellcheck -x --source-path=SCRIPTDIR $(files '*.sh' .ci/run) || complain "shellcheck: see above"
+# A checker is called where there is a file for it.
+scripts=$(files '*.sh' .ci/run) modules=$(files '*.py') package=$(files 'postproc/bergtow/*.py')
+sources=$(files 'src/*.c' 'partition/*.c')
+# shellcheck disable=SC2086 # one word a file
+if [ -n "$scripts" ] && have shellcheck; then
+    shellcheck -x --source-path=SCRIPTDIR $scripts || complain "shellcheck: see above"
 fi
-# shellcheck disable=SC2046
-if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
+# shellcheck disable=SC2086
+if [ -n "$modules" ] && have pyflakes3; then pyflakes3 $modules || complain "pyflakes: see above"; fi
 # The package alone: what it imports is taken as it comes, and the scripts beside it are not annotated throughout.
-if have mypy; then
+if [ -n "$package" ] && have mypy; then
     mypy --no-error-summary --cache-dir=/dev/null --ignore-missing-imports --follow-imports=skip \
         --disallow-untyped-defs --check-untyped-defs postproc/bergtow || complain "mypy: see above"
 fi
-if have cppcheck; then
+# shellcheck disable=SC2086
+if [ -n "$sources" ] && have cppcheck; then
     cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" \
         --suppressions-list=tests/cppcheck.supp --suppress=missingIncludeSystem \
         -Iinclude -Isrc -I. -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
-        --template='{file}:{line}: {id}: {message}' src partition || complain "cppcheck: see above"
+        --template='{file}:{line}: {id}: {message}' $sources || complain "cppcheck: see above"
 fi
 exit $bad

@@ -25,7 +25,7 @@ CASE = {
                                                            "breaking_load": 0}, "branch2": {"breaking_load": 120},
         "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
     },
-    "solver": {"tile": 2.5, "max_sweeps": 40},
+    "solver": {"cell_size": 2.5, "max_sweeps": 40},
     "output": {"sample_every": 3, "frame_interval": 0.7, "panels": True, "checkpoint_steps": 8},
 }
 

@@ -80,13 +80,13 @@ tow:
 water: {latitude: 75, tilt: dynamic, tide: {major: 0.2, minor: 0.1}}
 air: {wind_x: 5}
 CASE
-# Walls that close on dense ice: force chains through many tiles.
+# Walls that close on dense ice: force chains through many cells.
 cat >"$dir/press.yml" <<'CASE'
 run: {dt: 0.1, duration: 2}
 domain: {length: 20, width: 14, ends_closing: 0.1, sides_closing: 0.1}
 ice: {concentration: 0.85, size: 0.9}
 body: {shape: none}
-solver: {max_sweeps: 40, tile: 2}
+solver: {max_sweeps: 40, cell_size: 2}
 CASE
 cat >"$dir/study.yml" <<'CASE'
 base: tow.yml

@@ -125,9 +125,9 @@ SCENES = {
     "open_sides": changed(DENSE, domain__sides="open", domain__ends="open", water__current_y=0.1),
     "plain_sweeps": changed(DENSE, solver__plain=True, solver__max_sweeps=60),
     "plain_schedule": changed(DENSE, solver__plain_schedule=True, ice__restitution=0.2),
-    "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
+    "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__cell_size=3),
     "few_sweeps": changed(CLOSING, run__duration=1.5),
-    "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "turn_rows": 50, "slop": 5e-3,
+    "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "slop": 5e-3,
                                               "position_sweeps": 1, "rest_speed": 0.05},
                                ice__restitution=0.4, tow__speed=0.5),
     "guards_wide": changed(CLOSING, run__duration=0.7,
@@ -183,7 +183,6 @@ SCENES = {
     "outlines_frame": changed(SHORT, domain={"length": 15, "width": 8, "x0": 0, "y0": -4, "frame": "geographic",
                                                  "ends": "wall", "sides": "wall"}, ice={
         "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
-    "outlines_metres": changed(SHORT, ice={"outlines": "frame.geojson", "outlines_crs": "metres", "nonconvex": "hull"}),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
     "output_settings": changed(SHORT, run__title="samples of three steps", report={
         "client": "a", "project": "b", "author": "c", "revision": "d"}, output={
@@ -342,6 +341,13 @@ def store(binary, scenes):
     lines = [f'  "{n}": "{" ".join(scenes[n].get(i, "-") for i in items)}"' for n in SCENES if n in scenes]
     STORED.write_text(f'{{\n"recorded_with": "{binary}",\n'
                       f'"items": {json.dumps(items, indent=0)},\n"scenes": {{\n' + ",\n".join(lines) + "\n}\n}\n")
+
+
+def departed(name, items):
+    """(gone, new, changed): items of a run of a scene beside what is stored of it."""
+    want, found = stored()[1][name], digests(items)
+    return (sorted(want.keys() - found.keys()), sorted(found.keys() - want.keys()),
+            sorted(i for i in want if i in found and want[i] != found[i]))
 
 
 def record(names):

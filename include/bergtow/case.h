@@ -21,7 +21,7 @@ typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING 
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
 /// Coordinates of outlines: file, lonlat, plane, frame, metres.
-typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME, BT_CRS_METRES } bt_crs;
+typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME } bt_crs;
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_START_DRIFT, BT_START_REST } bt_start;                           // drift, rest
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
@@ -72,7 +72,6 @@ typedef struct bt_floe_def {
     int line;                  ///< where in the case file it stands, for messages
 } bt_floe_def;
 
-enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
 
 enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
 
@@ -216,8 +215,7 @@ typedef struct bt_case {
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
         int64_t inner_sweeps;    ///< sweeps of a cell in its turn
-        int64_t turn_rows;       ///< without effect, of cases written for earlier versions
-        double cell;             ///< least side of a cell / mean floe size
+        double cell_size;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool plain_schedule;     ///< passes by one thread (space/phases.h)
         bool warm_start;

@@ -178,8 +178,7 @@ struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
 
-/// Where the wall time of a run goes: X(name, what is in it). The last was added later: older checkpoints do not have
-/// it.
+/// Where the wall time of a run goes: X(name, what is in it).
 #define BT_WALL_PHASES(X)                                                                                              \
     X(detect, "labels and storage of bodies, margins, the detection of contacts")                                      \
     X(colour, "the order of the cells by their colours, and their distribution to threads")                            \
@@ -204,8 +203,8 @@ typedef struct bt_step_stats {
     int64_t sweeps, position_sweeps;
     int64_t position_updates; ///< of contacts by the sweeps of the position projection
     bool projected;          ///< the position projection came to its end, or there was nothing to do
-    int64_t unit_updates;    ///< of contacts by the sweeps
-    int64_t unit_moves;      ///< of contacts by momentum between sweeps
+    int64_t contact_updates;    ///< of contacts by the sweeps
+    int64_t contact_moves;      ///< of contacts by momentum between sweeps
     int64_t residual_checks; ///< of contacts by residual passes, and by velocities formed anew for them
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed

@@ -250,7 +250,7 @@ static void row(field *f, const char *series, int n_floes, double diameters, boo
 
 int main(void)
 {
-    puts("series,floes,tile_diameters,parts,tiles,method,imbalance,metis_imbalance,phase_imbalance,cut,halo_mean,halo_"
+    puts("series,floes,cell_diameters,parts,cells,method,imbalance,metis_imbalance,phase_imbalance,cut,halo_mean,halo_"
          "max,"
          "neighbours_mean,neighbours_max,sent_mean,sent_max,moved,metis_s,cut_s");
     for (int berg = 0; berg <= 1; berg++)

@@ -155,21 +155,15 @@ _GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "
 _DIMENSIONS = {"/series/time": "time", "/sample": "time", "/frames/time": "frame", "/impacts/time": "collision",
                "/events/time": "event", "/body": "other_body", "/body_end": "other_body_end",
                "/body_vertex": "other_body_vertex", "/event_kind": "kind_of_event"}
-#: the first dimension in files of earlier versions, which have no scales
-_FIRST = {"series": "time", "floes": "floe", "bodies": "other_body", "impacts": "collision", "panels": "panel",
-          "events": "event"}
 _POSE = (("x", "m", "x of the centroid"), ("y", "m", "y of the centroid"), ("yaw", "rad", "angle from the x axis"))
 
 
-def _dims(group: str, dataset: h5py.Dataset) -> tuple[str, ...] | None:
-    """Names of the dimensions of a dataset, None for one that has none in a file of an earlier version."""
+def _dims(dataset: h5py.Dataset) -> tuple[str, ...] | None:
+    """Names of the dimensions of a dataset by its scales, None for one that has none."""
     if all(len(axis) for axis in dataset.dims):
         scales = [axis[0].name for axis in dataset.dims]
         return tuple(_DIMENSIONS.get(name, name.lstrip("/")) for name in scales)
-    if dataset.ndim == 1 and dataset.name in _DIMENSIONS:
-        return (_DIMENSIONS[dataset.name],)
-    first = _FIRST[group]
-    return (first,) if dataset.ndim == 1 and not dataset.name.endswith(("offsets", "names", "towed")) else None
+    return (_DIMENSIONS[dataset.name],) if dataset.name in _DIMENSIONS else None
 
 
 def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
@@ -210,7 +204,7 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
 
     for group, prefix in _GROUPS.items():
         for name, dataset in file.get(group, {}).items():
-            if (dims := _dims(group, dataset)) is not None:
+            if (dims := _dims(dataset)) is not None:
                 put({"bodies/names": "other_body_name"}.get(f"{group}/{name}", prefix + name), dims, dataset)
     if "frames" in file:
         frames, n = file["frames"], len(file["floes/area"])

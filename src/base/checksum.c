@@ -127,8 +127,7 @@ static off_t end_of_hdf5(const ends *e)
 /// Why a file is not as it should be, in words.
 static bt_status refuse(const char *path, const char *kind, const ends *e, bt_errors *err)
 {
-    // Formats before these have their seal at the front.
-    const char *seal = is_seal(e->back) ? e->back : is_seal(e->front) ? e->front : NULL;
+    const char *seal = is_seal(e->back) ? e->back : NULL;
     char found[40] = "";
     if (seal) sscanf(seal + sizeof MAGIC - 1, "kind: %39[^\n]", found);
     const size_t word = strcspn(kind, " ");
@@ -167,8 +166,7 @@ bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_e
     int reason = read_ends(fd, &e) ? 0 : errno;
     if (!reason) {
         const off_t end = end_of_hdf5(&e), rest = e.size - BT_CHECKSUM_BYTES;
-        const bool sealed = is_seal(e.back) || is_seal(e.front);
-        if (bare && !sealed && (end < 0 || end == e.size)) *bare = true;
+        if (bare && !is_seal(e.back) && (end < 0 || end == e.size)) *bare = true;
         else if (!is_seal(e.back)) status = refuse(path, kind, &e, err);
         else if (!make(fd, rest, kind, wanted)) reason = errno;
         else if (memcmp(e.back, wanted, sizeof wanted)) status = refuse(path, kind, &e, err);
@@ -192,7 +190,7 @@ bool bt_checksum_there(const char *path, const char *kind)
     ends e;
     char begin[80];
     const int n = snprintf(begin, sizeof begin, MAGIC "kind: %.*s", (int)strcspn(kind, " "), kind);
-    return ends_of(path, &e) && (!strncmp(e.back, begin, (size_t)n) || !strncmp(e.front, begin, (size_t)n));
+    return ends_of(path, &e) && !strncmp(e.back, begin, (size_t)n);
 }
 
 bool bt_checksum_to_come(const char *path)

@@ -4,7 +4,7 @@
 // HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours ends in a seal of
 // 128 bytes, which is compared with all that stands before it before HDF5 sees a byte:
 //
-//     bergtow sealed file\nkind: checkpoint 4\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//     bergtow sealed file\nkind: checkpoint 5\nbytes: 123456\nxxh128: 0123...\n, then zeros
 //
 // HDF5 notes in its first bytes where its own part ends, and no reader of HDF5 or netCDF looks further. The seal must
 // be, to the last byte, what length and digest (XXH3, 128 bits) of that part make it: any flipped bit, any cut, any
@@ -25,10 +25,10 @@ enum {
 };
 
 // Kinds carry the version of the format: another one is refused with both names.
-#define BT_CHECKSUM_CHECKPOINT "checkpoint 4"
-#define BT_CHECKSUM_RESULT "result 2"
+#define BT_CHECKSUM_CHECKPOINT "checkpoint 5"
+#define BT_CHECKSUM_RESULT "result 3"
 #define BT_CHECKSUM_FIELD "field 2"
-#define BT_CHECKSUM_ENSEMBLE "ensemble 2"
+#define BT_CHECKSUM_ENSEMBLE "ensemble 3"
 
 /// Write the checksum behind a file that is complete, and bring all of it to the disk. Errors: BT_ERR_IO.
 bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err);

@@ -295,12 +295,11 @@ static void check_outlines(const check *k)
     if (c->ice.outlines && lon && crs != BT_CRS_FILE && crs != BT_CRS_LONLAT)
         bt_check_fault(k, "ice.origin_lon",
               "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin");
-    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME || crs == BT_CRS_METRES))
+    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME))
         bt_check_fault(k, "ice.origin_east",
               "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
               "ice.outlines_crs: plane");
-    // Every resolved case of before has metres, with outlines or without.
-    if (crs != BT_CRS_FILE && crs != BT_CRS_METRES && !c->ice.outlines)
+    if (crs != BT_CRS_FILE && !c->ice.outlines)
         bt_check_fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
     if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
         bt_check_fault(k, "ice.nonconvex",

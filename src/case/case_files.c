@@ -103,30 +103,22 @@ const char *bt_case_said_of(const char *text, const char *name)
     return NULL;
 }
 
-bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *warnings, bt_errors *err)
+bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *err)
 {
     const char *line = comment_in(text, ITSELF);
     if (line && is_itself(text, line)) return BT_OK;
-    if (!line) {
-        bt_errors_add(warnings, "warning: %s: nothing in it tells what it said when the run in %s began; it is taken "
-                                "as it is now", path, dir);
-        return BT_OK;
-    }
     bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
                        "(bergtow run)", path, dir);
     return BT_ERR_CASE;
 }
 
-bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *warnings, bt_errors *err)
+bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *err)
 {
     bt_status status = BT_OK;
     for (int k = 0; k < bt_n_case_keys; k++) {
         char *now = comment_of(c, &bt_case_keys[k]);
         const char *file = bt_case_file(c, &bt_case_keys[k]), *before = comment_in(c->text, bt_case_keys[k].name);
-        if (now && !before) {
-            bt_errors_add(warnings, "warning: %s: nothing in %s tells what it held when the run began; it is taken as "
-                                    "it is now", file, dir);
-        } else if (now && strncmp(before, now, strlen(now))) {
+        if (now && (!before || strncmp(before, now, strlen(now)))) {
             bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
                                "(bergtow run)", file, dir);
             status = BT_ERR_CASE;

@@ -29,12 +29,11 @@ char *bt_case_digests_in(const bt_case *c, const char *text);
 /// The caller frees it.
 char *bt_case_with_digests(const char *resolved, const char *digests);
 
-/// Is the case.resolved.yml of this text what its comment says? dir: of the run, for the messages; a warning tells that
-/// there is no comment, as in those of earlier versions. Errors: BT_ERR_CASE.
-bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *warnings, bt_errors *err);
+/// Is the case.resolved.yml of this text what its comment says? dir: of the run, for the messages. Errors: BT_ERR_CASE.
+bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *err);
 
 /// Are the files what the comments in c->text say? The rest as above.
-bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *warnings, bt_errors *err);
+bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *err);
 
 /// What a text says behind "NAME: " at the beginning of a line, NULL = nothing.
 const char *bt_case_said_of(const char *text, const char *name);

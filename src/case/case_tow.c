@@ -413,14 +413,13 @@ static void check_programme(const bt_check *k)
                            p[2 * i + 2], p[2 * i]);
             return;
         }
-    double speed, time, whole, last; // resolved cases of before have those of the whole programme
+    double speed, time;
     largest_speed(c, programme_end(c), &speed, &time);
-    largest_speed(c, INFINITY, &whole, &last);
-    if (bt_check_sound(k, "tow.speed") && c->tow.speed != speed && c->tow.speed != whole)
+    if (bt_check_sound(k, "tow.speed") && c->tow.speed != speed)
         bt_check_fault(k, "tow.speed",
                        "%g m/s has no effect with tow.programme, whose largest speed is %g m/s; remove one of them",
                        c->tow.speed, speed);
-    if (bt_check_sound(k, "tow.ramp") && c->tow.ramp != time && c->tow.ramp != last)
+    if (bt_check_sound(k, "tow.ramp") && c->tow.ramp != time)
         bt_check_fault(
             k, "tow.ramp",
             "%g s has no effect with tow.programme, which reaches its largest speed at %g s; remove one of them",

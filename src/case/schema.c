@@ -31,7 +31,7 @@ static const char *const bounds[] = {"wall", "periodic", "open", NULL};
 static const char *const end_bounds[] = {"wall", "periodic", "open", "moving", NULL};
 static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NULL};
 static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
-static const char *const crss[] = {"file", "lonlat", "plane", "frame", "metres", NULL};
+static const char *const crss[] = {"file", "lonlat", "plane", "frame", NULL};
 static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const starts[] = {"drift", "rest", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
@@ -195,8 +195,7 @@ bt_key bt_case_keys[] = {
          "in m and id are optional) read instead of making a field; relative to the folder of the case file"),
     CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "file",
            "coordinates of the outlines: what the file's crs says, degrees without one [RFC 7946]; for a file without "
-           "crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case; metres: "
-           "its old name)"),
+           "crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case)"),
     REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]",
          "longitude of x = y = 0: of outlines in degrees (none: their middle), projected about it (azimuthal "
          "equidistant, within 100 km), and of what bergtow field writes as GeoJSON"),
@@ -403,10 +402,7 @@ bt_key bt_case_keys[] = {
         "far off; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
         "times a cell that still changes is swept before the next has its turn"),
-    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",
-        "without effect: sweeps no longer follow each other through large fields; accepted in cases written for "
-        "earlier versions, and to be taken out"),
-    REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]",
+    REAL("solver.cell_size", solver.cell_size, RATIO, "5", "[2, 100]",
          "least side of the cells / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false",
          "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of "

@@ -60,7 +60,6 @@
     ROW(NOT_FINITE, "not_finite", "", "the forces on the body are not finite")                                         \
     ROW(WITHIN_RAMP, "within_ramp", "start_s - ramp_s", "the window begins before the tow has its speed")              \
     /* the case */                                                                                                     \
-    ROW(TURN_ROWS, "turn_rows", "", "solver.turn_rows has no effect")                                                  \
     ROW(IDLE, "idle", "keys", "keys of the case have no effect")                                                       \
     ROW(SPEED_JUMP, "speed_jump", "from_m_s to_m_s", "the speed of the tow changes within a step")                     \
     ROW(TURN_JUMP, "turn_jump", "waypoint", "the course of the tow changes within a step")                             \

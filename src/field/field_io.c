@@ -151,8 +151,8 @@ static double read_number(const reader *r, const char *name)
     return number;
 }
 
-/// The frame that the file names, or "": files of before do not. It is of fixed length: HDF5 1.10 may search for ever
-/// for a text of any length in a file with flipped bits.
+/// The frame that the file names, or "": those of other programs may not. Of fixed length: HDF5 1.10 may search for
+/// ever for a text of any length in a file with flipped bits.
 static void read_frame(const reader *r, char frame[16])
 {
     *frame = 0;
@@ -168,7 +168,7 @@ static void read_frame(const reader *r, char frame[16])
     H5Aclose(a);
 }
 
-/// The ice region, where the file says all of it: those of before do not.
+/// The ice region, where the file says all of it: those of other programs may not.
 static void read_region(const reader *r, double region[4])
 {
     double x[4];

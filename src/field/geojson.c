@@ -385,30 +385,22 @@ static void read_feature(reader *s, bt_features *features, size_t index, double 
 }
 
 /// Metres as the case calls them, of a file that does not say it.
-static void choose_metres(reader *s, bool basin)
+static void choose_metres(reader *s)
 {
-    const bt_crs key = s->c->ice.outlines_crs;
-    s->kind = key == BT_CRS_PLANE ? PLANE : FRAME;
+    s->kind = s->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
     snprintf(s->crs.name, sizeof s->crs.name, "local");
-    if (key == BT_CRS_METRES && !basin)
-        bt_refuse(&s->r, "ice.outlines_crs: metres was [x, y] = [north, east] in the geographic frame, while positions "
-                         "are [east, north] in GeoJSON; set plane for metres [east, north], "
-                         "or frame for [x, y]");
 }
 
-/// What the coordinates are: by the mark of this program, the file's crs, the case; a file that contradicts the case is
-/// refused.
+/// What the coordinates are: by the file's crs, or the case; a file that contradicts the case is refused.
 static void choose_coordinates(reader *s, const json_t *root)
 {
     const json_t *crs = json_object_get(root, "crs"), *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(crs, "type")),
                *name = json_string_value(json_object_get(json_object_get(crs, "properties"), "name"));
-    const char *frame = json_string_value(json_object_get(mark, "frame")),
-               *marked = json_string_value(json_object_get(mark, "coordinates"));
+    const char *frame = json_string_value(json_object_get(mark, "frame"));
     const bt_crs key = s->c->ice.outlines_crs;
     const bool basin = s->c->domain.frame == BT_FRAME_BASIN, degrees = key == BT_CRS_LONLAT,
                metres = key != BT_CRS_FILE && key != BT_CRS_LONLAT;
-    const bool old = marked && !strcmp(marked, "metres") && !crs; // [x, y] of the frame
     s->crs.kind = BT_MAP_LOCAL;
     if (crs && (!type || strcmp(type, "name") || !name) && key == BT_CRS_FILE) {
         bt_refuse(&s->r, "its crs is not given by a name ({\"type\": \"name\", \"properties\": {\"name\": "
@@ -417,15 +409,13 @@ static void choose_coordinates(reader *s, const json_t *root)
     }
     if (crs && name) s->crs = bt_map_crs_of(name);
     const bool said = crs && name && s->crs.kind != BT_MAP_UNKNOWN;
-    if (old || (said && s->crs.kind == BT_MAP_LOCAL)) {
-        s->kind = old ? FRAME : PLANE;
+    if (said && s->crs.kind == BT_MAP_LOCAL) {
+        s->kind = PLANE;
         snprintf(s->crs.name, sizeof s->crs.name, "local");
-        if (degrees || (old ? key == BT_CRS_PLANE : key == BT_CRS_FRAME))
-            bt_refuse(&s->r, "its coordinates are metres%s, written by bergtow; remove ice.outlines_crs: %s",
-                      old ? " x, y of the case's frame" : " east and north",
-                      degrees ? "lonlat"
-                      : old   ? "plane"
-                              : "frame");
+        if (degrees || key == BT_CRS_FRAME)
+            bt_refuse(&s->r,
+                      "its coordinates are metres east and north, written by bergtow; remove ice.outlines_crs: %s",
+                      degrees ? "lonlat" : "frame");
         else if (frame && strcmp(frame, basin ? "basin" : "geographic"))
             bt_refuse(&s->r,
                       "its coordinates are metres of the frame %.20s; set domain.frame: %.20s, or make the field for "
@@ -438,7 +428,7 @@ static void choose_coordinates(reader *s, const json_t *root)
                   s->crs.name);
     } else if (said) {
         s->kind = s->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
-        if (s->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME || (key == BT_CRS_METRES && !basin))
+        if (s->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
             bt_refuse(
                 &s->r,
                 "its crs is %s, in %s, and ice.outlines_crs says else; remove the key, or correct the crs of the file",
@@ -450,7 +440,7 @@ static void choose_coordinates(reader *s, const json_t *root)
                   "coordinates are metres east and north",
                   name);
     } else if (metres) {
-        choose_metres(s, basin);
+        choose_metres(s);
     } else {
         s->kind = DEGREES;
         s->assumed = !degrees;

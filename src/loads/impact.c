@@ -150,14 +150,14 @@ static void follow_events(bt_impacts *m, double time)
 static void add_loads(bt_impacts *m, double c, double s)
 {
     double hit[2] = {0, 0}, push = 0;
-    m->largest_push = 0;
+    m->largest_quasi_static_load = 0;
     for (int64_t i = 0; i < m->n_contacts; i++) {
         const bt_body_contact *t = &m->contact[i];
         const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx,
                      part = t->collision / t->normal;
         hit[0] += part * fx, hit[1] += part * fy;
         push = t->normal - t->collision + (i > 0 && t[-1].gid == t->gid ? push : 0);
-        m->largest_push = bt_max(m->largest_push, push / m->dt);
+        m->largest_quasi_static_load = bt_max(m->largest_quasi_static_load, push / m->dt);
         for (int k = 0; k < 2; k++) {
             if (!(t->point[k] > 0)) continue;
             const double share = t->point[k] / t->normal / m->dt;

@@ -100,7 +100,7 @@ typedef struct bt_impacts {
     bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
     int64_t n_closed, cap_closed;
     double collision_x, collision_y; ///< share of collisions in the contact impulse on the body, world frame, N s
-    double largest_push;  ///< Σ (λ − λ_c) / Δt over the manifolds of one floe or wall, N
+    double largest_quasi_static_load;  ///< Σ (λ − λ_c) / Δt over the manifolds of one floe or wall, N
     // carried on
     bt_impact_open *open; ///< [n_open] by gid
     int64_t n_open;

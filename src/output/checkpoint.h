@@ -53,7 +53,7 @@
 //                     - stats
 //   bt_impacts        S open
 //                     D rule, panels' places
-//                     - contact, closed, collision, largest_push, panels' loads
+//                     - contact, closed, collision, largest_quasi_static_load, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way
 //                     in result.h5: the entries and frames themselves
 //   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)

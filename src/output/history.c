@@ -30,7 +30,7 @@ static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged),
     COLUMN(BT_COL_RESIDUAL, "residual", residual),
     COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
-    COLUMN(BT_COL_QUASI_STATIC, "push", largest_push),
+    COLUMN(BT_COL_QUASI_STATIC, "quasi_static", largest_quasi_static_load),
     COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice),
     COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice),
     COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water),
@@ -56,25 +56,20 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
         .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
         .offset = offsetof(bt_sample, from)                                                                            \
     }
-#define LATER(type, member, rule_, from, missing_)                                                                     \
-    {                                                                                                                  \
-        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
-        .offset = offsetof(bt_sample, from), .missing = BT_TOTAL_##missing_                                            \
-    }
 static const bt_total totals[] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
-    TOTAL(F64, sum_updates, SUM, unit_updates),
+    TOTAL(F64, sum_updates, SUM, contact_updates),
     TOTAL(F64, sum_moves, SUM, momentum_moves),
-    LATER(F64, sum_checks, SUM, residual_checks, UNKNOWN),
-    LATER(F64, sum_projected, SUM, position_updates, UNKNOWN),
+    TOTAL(F64, sum_checks, SUM, residual_checks),
+    TOTAL(F64, sum_projected, SUM, position_updates),
     TOTAL(F64, contact_work, SUM, contact_work),
     TOTAL(F64, max_overlap, MAX, overlap),
     TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
     TOTAL(F64, max_residual, MAX, residual),
     TOTAL(I64, unconverged, STEPS, unconverged),
-    LATER(F64, locked_steps, STEPS, locked, UNKNOWN),
-    LATER(F64, no_load_steps, STEPS, no_load, UNKNOWN),
+    TOTAL(F64, locked_steps, STEPS, locked),
+    TOTAL(F64, no_load_steps, STEPS, no_load),
     TOTAL(I64, unprojected, STEPS, unprojected),
     TOTAL(I64, positive_work, STEPS, added_energy),
     TOTAL(I64, restitution_cut, STEPS, restitution_cut),
@@ -98,7 +93,7 @@ static const bt_total *total_of_law(int k)
             made[i] = (bt_total){
                 .at = {t->name, t->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
                        offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value)},
-                .rule = t->rule, .missing = t->later ? BT_TOTAL_ZERO : BT_TOTAL_THERE,
+                .rule = t->rule,
                 .offset = offsetof(bt_sample, laws) + (size_t)number * sizeof(double)};
         }
     return &made[k];

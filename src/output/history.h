@@ -24,7 +24,7 @@ typedef enum bt_column {
     BT_COL_RESIDUAL,
     BT_COL_COLLISION,
     BT_COL_QUASI_STATIC,
-    BT_COL_SPEED_ICE, ///< from here on not in older checkpoints: then NaN
+    BT_COL_SPEED_ICE,
     BT_COL_LEEWAY_ICE,
     BT_COL_SPEED_WATER,
     BT_COL_LEEWAY_WATER,
@@ -59,8 +59,6 @@ enum { BT_HISTORY_NAME = 80 };
 typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
     bt_total_rule rule;
-    /// In a checkpoint of before there was such a number: ZERO, as nothing could add to it then; UNKNOWN, NaN
-    enum { BT_TOTAL_THERE, BT_TOTAL_ZERO, BT_TOTAL_UNKNOWN } missing;
     size_t offset;                        ///< of the number in bt_sample
 } bt_total;
 int bt_n_history_totals(void);

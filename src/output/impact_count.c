@@ -14,9 +14,9 @@ void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_hist
     c->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *c->peaks);
     c->panel = bt_alloc((size_t)m->panels.n, sizeof *c->panel);
     c->collision_resistance = bt_stats_mean(w->n ? h->column[BT_COL_COLLISION] + w->first : NULL, w->n).mean;
-    c->push_resistance = w->series[BT_REPORTED_ICE].mean.mean - c->collision_resistance;
-    c->largest_push = bt_history_largest(push, w->first, h->n);
-    c->start_push = bt_history_largest(push, 0, w->first);
+    c->quasi_static_resistance = w->series[BT_REPORTED_ICE].mean.mean - c->collision_resistance;
+    c->largest_quasi_static_load = bt_history_largest(push, w->first, h->n);
+    c->start_quasi_static_load = bt_history_largest(push, 0, w->first);
 }
 
 void bt_impact_count_free(bt_impact_count *c)

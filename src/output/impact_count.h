@@ -33,9 +33,9 @@ typedef struct bt_impact_count {
     double *peaks;        ///< [n_peaks] of the window, a heap with the smallest first, N
     int64_t n_peaks;
     bt_panel_hits *panel; ///< [panels]
-    double collision_resistance, push_resistance; ///< means over the window, N
+    double collision_resistance, quasi_static_resistance; ///< means over the window, N
     /// of one floe in a step, in the window and before it, N; NaN without a step there
-    double largest_push, start_push;
+    double largest_quasi_static_load, start_quasi_static_load;
 } bt_impact_count;
 
 /// Begin to count over the window; what is of steps is taken at once.

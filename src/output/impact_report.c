@@ -52,7 +52,7 @@ void bt_impacts_print(const bt_impact_count *c, bool at_least)
     printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s%s of the mean resistance, ",
            (long long)c->n, c->start, (double)c->n / c->hours, least, bt_force_text(a, c->collision_resistance));
     if (at_least) printf("the quasi-static rest has no bound\n");
-    else printf("quasi-static %s\n", bt_force_text(b, c->push_resistance));
+    else printf("quasi-static %s\n", bt_force_text(b, c->quasi_static_resistance));
     if (c->n > 0) {
         printf("    peaks%s (%s)", at_least ? ", at least" : "", c->conversion);
         double *peaks = sorted(c);
@@ -60,10 +60,11 @@ void bt_impacts_print(const bt_impact_count *c, bool at_least)
         for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
             printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]),
                    (double)rank_of(k) / c->hours);
-        printf("; largest quasi-static load %s%s\n", least, bt_force_text(a, c->largest_push));
+        printf("; largest quasi-static load %s%s\n", least, bt_force_text(a, c->largest_quasi_static_load));
         free(peaks);
     }
     if (c->n_all > c->n)
         printf("    start             %lld before the window, the largest peak %s, the largest quasi-static load %s\n",
-               (long long)(c->n_all - c->n), bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
+               (long long)(c->n_all - c->n), bt_force_text(a, c->start_peak),
+               bt_force_text(b, c->start_quasi_static_load));
 }

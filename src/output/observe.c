@@ -174,7 +174,7 @@ static void observe_impacts(const bt_world *w, bt_sample *s)
     const bt_impacts *m = w->impacts;
     s->collision_resistance = 0.0 - (m->collision_x * w->tow->ux + m->collision_y * w->tow->uy) / w->par.dt;
     s->collisions = (double)m->n_closed;
-    s->largest_push = m->largest_push;
+    s->largest_quasi_static_load = m->largest_quasi_static_load;
     s->impact_peak = 0;
     for (int64_t i = 0; i < m->n_closed; i++) s->impact_peak = bt_max(s->impact_peak, m->closed[i].peak);
 }

@@ -76,8 +76,8 @@ const char *bt_balance_words(void)
 /// What contacts do to the towed body: no numbers in a step without a load.
 static const size_t loads[] = {
     offsetof(bt_sample, ice_resistance), offsetof(bt_sample, ice_force_x), offsetof(bt_sample, ice_force_y),
-    offsetof(bt_sample, ice_moment), offsetof(bt_sample, ice_resistance_budget), offsetof(bt_sample, largest_push),
-    offsetof(bt_sample, tow_force), // the last: not on a line
+    offsetof(bt_sample, ice_moment), offsetof(bt_sample, ice_resistance_budget),
+    offsetof(bt_sample, largest_quasi_static_load), offsetof(bt_sample, tow_force), // the last: not on a line
 };
 enum { N_LOADS = sizeof loads / sizeof *loads };
 

@@ -46,7 +46,7 @@ typedef struct bt_sample {
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
-    double unit_updates, momentum_moves; ///< of contacts, in all sweeps of the step
+    double contact_updates, momentum_moves; ///< of contacts, in all sweeps of the step
     double residual_checks;  ///< of contacts, in all residual passes of the step
     double position_updates; ///< of contacts, in the sweeps of the position projection
     double unprojected;     ///< 1 if the position projection met its limit
@@ -69,7 +69,7 @@ typedef struct bt_sample {
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
     /// largest force of a floe on the body that no collision explains, N; NaN as for the collisions
-    double largest_push;
+    double largest_quasi_static_load;
     double moving;          ///< floes faster than 1 % of the reference speed
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
@@ -196,7 +196,7 @@ typedef struct bt_run_totals {
     double stepped;              ///< bt_clock after the last step of this call
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;
-    double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
+    double imbalance, worst_imbalance, repartition_imbalance, worst_repartition_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     /// what a sweep goes through for a contact point of the last step: batches and velocities, B; NaN without contacts
     double sweep_bytes_per_contact;

@@ -67,7 +67,7 @@ static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 
 /// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
 /// the first n entries x of series k.
-void bt_record_check_run(bt_record *r, bt_snapshot *s, bt_h5_reader *old);
+void bt_record_check_run(bt_snapshot *s, bt_h5_reader *old);
 void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
                             bt_h5_reader *old);
 

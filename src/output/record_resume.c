@@ -35,7 +35,7 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
     for (int k = 0; k < h->n_columns; k++)
         bt_snapshot_add(s, bt_history_name(k, name), BT_ITEM_F64, h->n, 1, h->column[k]);
-    if (*r->identity) bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
+    bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
@@ -72,8 +72,9 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
-/// A force that the run had not: it was 0.
+/// A force that the run had not: it was 0. Of the series, those that programs have added alone.
 static bool was_zero(const bt_quantity *q) { return q->role == BT_ROLE_BALANCE; }
+static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
 
 /// NaN: a force on the towed body where there is none.
 static bool all_zero(const bt_item *i)
@@ -113,54 +114,26 @@ static void check_added(bt_snapshot *s)
 /// n: steps done; each has a value.
 static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
-    for (int k = 0; k < bt_n_history_totals(); k++) {
-        const bt_total *t = bt_history_total(k);
-        char name[BT_HISTORY_NAME];
-        snprintf(name, sizeof name, "history/%s", t->at.name);
-        const double unknown = NAN;
-        if (t->missing == BT_TOTAL_THERE || bt_snapshot_find(s, name))
-            bt_snapshot_take_rows(s, "history", &t->at, 1, h);
-        else if (t->missing == BT_TOTAL_UNKNOWN) memcpy((char *)h + t->at.offset, &unknown, sizeof unknown);
-    }
+    for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_take_rows(s, "history", &bt_history_total(k)->at, 1, h);
     check_added(s);
     h->n = h->cap = n;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < h->n_columns; k++) {
         free(h->column[k]);
-        const bool later = k >= BT_COL_SPEED_ICE; // came after the first checkpoints
-        if (later && !bt_snapshot_find(s, bt_history_name(k, name))) {
-            h->column[k] = bt_alloc((size_t)n, sizeof *h->column[k]);
-            for (int64_t i = 0; k < BT_N_COLUMNS && i < n; i++) h->column[k][i] = NAN;
-            continue;
-        }
-        h->column[k] = bt_snapshot_copy(s, bt_history_name(k, name), BT_ITEM_F64, 1, &n);
+        const bool there = k < BT_N_COLUMNS || bt_snapshot_find(s, bt_history_name(k, name));
+        h->column[k] = there ? bt_snapshot_copy(s, bt_history_name(k, name), BT_ITEM_F64, 1, &n)
+                             : bt_alloc((size_t)n, sizeof *h->column[k]);
         bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
     }
     if (s->faulty) h->n = 0;
 }
 
-/// In a result without this series: a force and a contact law that the run had not were 0 all the time; another number
-/// of the program's own was not taken.
-static double missing_value(int k)
-{
-    const bt_quantity *q = bt_series(k);
-    const size_t laws = offsetof(bt_sample, laws);
-    const bool of_law = q->offset >= laws && q->offset < laws + sizeof((bt_sample){0}.laws);
-    return was_zero(q) || of_law ? 0 : NAN;
-}
-
 /// The entry under way.
 static void load_merged(bt_record *r, bt_snapshot *s)
 {
-    const char *all = "record/merged"; // of earlier versions
-    if (bt_snapshot_find(s, all)) {
-        bt_snapshot_take(s, all, BT_ITEM_F64, r->n_series, 1, r->merged);
-        return;
-    }
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < r->n_series; k++) {
-        const bool maybe = k < bt_n_program_series() || was_zero(bt_series(k));
-        if (maybe && !bt_snapshot_find(s, merged_name(k, name))) r->merged[k] = missing_value(k);
+        if (may_lack(k) && !bt_snapshot_find(s, merged_name(k, name))) r->merged[k] = 0;
         else bt_snapshot_take(s, merged_name(k, name), BT_ITEM_F64, 1, 1, &r->merged[k]);
     }
 }
@@ -171,9 +144,8 @@ static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, i
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < r->n_series && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
-        const bool maybe = k < bt_n_program_series() || was_zero(bt_series(k));
-        if (maybe && !bt_h5_there(old, name))
-            for (int64_t i = 0; i < n; i++) x[i] = missing_value(k);
+        if (may_lack(k) && !bt_h5_there(old, name))
+            for (int64_t i = 0; i < n; i++) x[i] = 0;
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_record_check_series(r, k, x, n, s, old);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
@@ -183,29 +155,20 @@ static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, i
     r->written = n;
 }
 
-/// Vectors of frame k to v [n][2]; of a file of an earlier version, which has none, NaN.
-static void read_vectors(bt_h5_reader *old, const char *name, int64_t k, bt_idx n, float *v)
-{
-    for (bt_idx i = 0; i < 2 * n; i++) v[i] = NAN;
-    if (bt_h5_there(old, name)) bt_h5_read(old, name, H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
-}
-
 static void read_velocities_and_forces(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
 {
     float *v = bt_alloc((size_t)n, 2 * sizeof *v);
-    read_vectors(old, "/frames/velocity", k, n, v);
+    bt_h5_read(old, "/frames/velocity", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
     for (bt_idx i = 0; i < n; i++) rows[i].vx = (double)v[2 * i], rows[i].vy = (double)v[2 * i + 1];
-    read_vectors(old, "/frames/net_force", k, n, v);
+    bt_h5_read(old, "/frames/net_force", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
     for (bt_idx i = 0; i < n; i++) rows[i].fx = (double)v[2 * i], rows[i].fy = (double)v[2 * i + 1];
     free(v);
 }
 
-/// The tow line of frame k; of a file of an earlier version NaN.
+/// The tow line of frame k.
 static void read_line(bt_h5_reader *old, int64_t k, int branches, bt_frame_line *line)
 {
     if (branches == 0) return;
-    *line = (bt_frame_line){.tension = {NAN, NAN}, .point = {{{NAN, NAN}, {NAN, NAN}}, {{NAN, NAN}, {NAN, NAN}}}};
-    if (!bt_h5_there(old, "/frames/line_points")) return;
     bt_h5_read(old, "/frames/line_points", H5T_NATIVE_DOUBLE, k, 1, 4 * branches, &line->point[0][0][0]);
     bt_h5_read(old, "/frames/line_tension", H5T_NATIVE_DOUBLE, k, 1, branches, line->tension);
 }
@@ -292,7 +255,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     if (first) {
         load_history(&r->history, s, step);
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
-        if (!s->faulty && old.status == BT_OK) bt_record_check_run(r, s, &old);
+        if (!s->faulty && old.status == BT_OK) bt_record_check_run(s, &old);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) load_series(r, s, &old, entries);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);

@@ -2,9 +2,9 @@
 // Is the result in a folder of the run that a checkpoint is of? A checkpoint that was kept while another run took the
 // folder, or comes from another folder, would go on in a result whose beginning is not its own.
 //
-// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Files of
-// earlier versions have none: their cases are compared instead. Runs that began alike may have been led apart by a
-// program; and so the series, too, are compared with the history that the checkpoint keeps of every step.
+// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Runs
+// that began alike may have been led apart by a program; and so the series, too, are compared with the history that
+// the checkpoint keeps of every step.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,25 +52,11 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *s, const char *why)
     old->status = BT_ERR_CASE;
 }
 
-/// A new version may write more keys of the same case.
-static bool same_case(const bt_case *c, bt_snapshot *s, bt_h5_reader *old)
-{
-    if (!bt_h5_there(old, "/case")) return true;
-    char *text = bt_h5_read_text(old, "/case");
-    const bt_item *kept = bt_snapshot_find(s, "case/resolved");
-    const bool alike = text && kept && kept->type == BT_ITEM_TEXT && !strcmp(text, kept->data);
-    const bool same = !text || alike || same_values(c, text);
-    free(text);
-    return same;
-}
-
-void bt_record_check_run(bt_record *r, bt_snapshot *s, bt_h5_reader *old)
+void bt_record_check_run(bt_snapshot *s, bt_h5_reader *old)
 {
     char *its = bt_h5_read_word(old, IDENTITY);
-    const char *mine = bt_snapshot_find(s, BT_RECORD_IDENTITY) ? bt_snapshot_text(s, BT_RECORD_IDENTITY) : NULL;
-    if (its && mine && strcmp(its, mine) != 0) refuse(old, s, "it began with another case or other ice");
-    if (!(its && mine) && !same_case(r->c, s, old)) refuse(old, s, "its case is another");
-    if (its && !mine && old->status == BT_OK) bt_record_identify(r, its, r->h5.err); // as its later checkpoints have it
+    if (strcmp(its ? its : "", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)
+        refuse(old, s, "it began with another case or other ice");
     free(its);
 }
 
@@ -116,7 +102,7 @@ bt_status bt_record_keep_case(const bt_record *r, bt_errors *err)
     char *digests = read ? bt_case_digests_in(r->c, text) : NULL, *wanted = bt_case_with_digests(resolved, digests);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        if (!read || !same_values(r->c, text)) // otherwise it is of an earlier version
+        if (!read || !same_values(r->c, text)) // otherwise its comments have been edited
             bt_errors_add(&warnings,
                           "warning: %s: was not the case that the run began with; it is written anew, by the "
                           "checkpoint",

@@ -117,10 +117,10 @@ const bt_quantity bt_own_series[] = {
     ROW(contacts_body, ALWAYS, MEAN, "1", "contact points on the towed body"),
     AT(stats.sweeps, sweeps, ALWAYS, MEAN, "1",
         "sweeps of the contact solver in a step", DIAGNOSTIC, "sweeps", "mean_sweeps"),
-    AT(stats.unit_updates, unit_updates, ALWAYS, MEAN, "1",
+    AT(stats.contact_updates, contact_updates, ALWAYS, MEAN, "1",
         "updates of single contacts by the sweeps of a step: a sweep leaves out contacts that bear no load "
-        "and open", NONE, NULL, "mean_unit_updates"),
-    AT(stats.unit_moves, momentum_moves, ALWAYS, MEAN, "1",
+        "and open", NONE, NULL, "mean_contact_updates"),
+    AT(stats.contact_moves, momentum_moves, ALWAYS, MEAN, "1",
         "contacts moved on along their last change between the sweeps of a step", NONE, NULL, "mean_momentum_moves"),
     AT(stats.residual_checks, residual_checks, ALWAYS, MEAN, "1",
         "residuals of single contacts that were taken in a step, and velocities formed anew for them; they count "
@@ -178,10 +178,10 @@ const bt_quantity bt_own_series[] = {
     SHOWN(impact_peak, IMPACTS, MAX, "N",
         "largest peak force of these collisions by impact.conversion, 0 without a collision; NaN if not told "
         "apart", NONE, NULL, "impacts.largest.peak_n"),
-    SHOWN(largest_push, IMPACTS, MAX, "N",
+    SHOWN(largest_quasi_static_load, IMPACTS, MAX, "N",
         "largest normal force of a floe or wall on the towed body that is no collision, impulse / dt; NaN if not told "
         "apart",
-        NONE, NULL, "impacts.largest_push_n"),
+        NONE, NULL, "impacts.largest_quasi_static_load_n"),
     ROW(moving, ALWAYS, LAST, "1", "floes faster than 1 % of the reference speed"),
     // here those of the contact laws: src/contact/crush.c, raft.c
     SHOWN(window_x, WINDOW, LAST, "m",

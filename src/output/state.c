@@ -73,17 +73,11 @@ static const bt_state_row tow_rows[] = {
 static const bt_state_row window_rows[] = {
     WINDOW(F64, 1, start),   WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),        WINDOW(I64, 1, missed),
     WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
+    WINDOW(F64, 1, most),    WINDOW(F64, 1, overtaken),   MEMBER(bt_window, "rear_in_ice", F64, 1, rear),
 };
-/// Checkpoints of before have `rear` over ground: less the drift then.
-static const bt_state_row rear_rows[] = {MEMBER(bt_window, "rear_in_ice", F64, 1, rear)},
-                          ground_rows[] = {WINDOW(F64, 1, rear)};
-/// Not in checkpoints of before: then from here on.
-static const bt_state_row overtaken_rows[] = {WINDOW(F64, 1, most), WINDOW(F64, 1, overtaken)};
 
-/// Under the name of the window where there is one, as in checkpoints of before the ice was followed without it.
 #define UNDISTURBED(width, member) MEMBER(bt_undisturbed, #member, F64, width, member)
 static const bt_state_row undisturbed_rows[] = {UNDISTURBED(1, drift_x), UNDISTURBED(1, drift_y), UNDISTURBED(4, vel)};
-static const char *undisturbed_of(const bt_world *w) { return w->window ? "window" : "undisturbed"; }
 
 enum {
     IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double),
@@ -93,11 +87,9 @@ enum {
 
 #define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
 static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time),   STALL(F64, asked), STALL(F64, spent),
-                                          STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun)};
-/// Not in checkpoints of before, which have 0 for the window under way.
-static const bt_state_row held_rows[] = {STALL(F64, ice), STALL(F64, pull)};
-/// Nor these.
-static const bt_state_row inside_rows[] = {STALL(F64, inside), STALL(F64, inside_from), STALL(U8, outside)};
+                                          STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun),
+                                          STALL(F64, ice),     STALL(F64, pull),   STALL(F64, inside),
+                                          STALL(F64, inside_from), STALL(U8, outside)};
 
 #define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
 static const bt_state_row lead_rows[] = {
@@ -125,29 +117,17 @@ static const bt_state_row field_rows[] = {
     FIELD(I64, "parts", outlines.parts),
     FIELD(F64, "lon", outlines.lon),
     FIELD(F64, "lat", outlines.lat),
-};
-
-/// Not in checkpoints of before, whose fields had none of this.
-static const bt_state_row map_rows[] = {
     FIELD(I64, "rounded", outlines.rounded),
     FIELD(I64, "rounded_corners", outlines.rounded_corners),
     FIELD(F64, "rounded_area", outlines.rounded_area),
     FIELD(F64, "east", outlines.east),
     FIELD(F64, "north", outlines.north),
     FIELD(I64, "unnamed", outlines.unnamed),
-};
-
-/// Nor these.
-static const bt_state_row ice_rows[] = {
     FIELD(I64, "bare", outlines.bare),
     FIELD(I64, "outside", outlines.outside),
     FIELD(F64, "outside_area", outlines.outside_area),
     FIELD(F64, "own_area", outlines.own_area),
     FIELD(F64, "region_area", outlines.region_area),
-};
-
-/// Nor these: then the domain.
-static const bt_state_row region_rows[] = {
     FIELD(F64, "x_min", outlines.region[0]),
     FIELD(F64, "y_min", outlines.region[1]),
     FIELD(F64, "x_max", outlines.region[2]),
@@ -159,14 +139,10 @@ _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
-    bt_snapshot_add_rows(s, "stall", held_rows, N_OF(held_rows), t);
-    bt_snapshot_add_rows(s, "stall", inside_rows, N_OF(inside_rows), t);
 }
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
 {
     bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
-    if (bt_snapshot_find(s, "stall/ice")) bt_snapshot_take_rows(s, "stall", held_rows, N_OF(held_rows), t);
-    if (bt_snapshot_find(s, "stall/inside")) bt_snapshot_take_rows(s, "stall", inside_rows, N_OF(inside_rows), t);
 }
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
 {
@@ -194,9 +170,9 @@ typedef struct {
 /// Its columns in the file.
 static const bt_state_row body_columns[] = {
     MEMBER(body_row, "pose", F64, 3, pose),         MEMBER(body_row, "velocity", F64, 3, vel),
-    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "tile", I32, 2, cell),
+    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "cell", I32, 2, cell),
     MEMBER(body_row, "copy", I32, 1, copy),         MEMBER(body_row, "lap", I32, 1, lap),
-    MEMBER(body_row, "stirred", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
+    MEMBER(body_row, "disturbed", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -320,7 +296,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     assert(w->bodies.n == n); // nothing is distributed yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++) {
-        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/stirred", g,
+        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/disturbed", g,
                          "is neither 0 nor 1");
         put_row(w, bt_world_index(w, g), &rows[g]);
     }
@@ -342,28 +318,6 @@ static const bt_state_row memory_columns[] = {
     MEMBER(bt_memory, "law", U16, 1, law),
 };
 
-/// A checkpoint of before laws had numbers: impulse [2], friction, and whether the row is not that but the depths that
-/// the pair has crushed.
-static void renew_contacts(bt_snapshot *s)
-{
-    if (bt_snapshot_find(s, "contacts/law") || !bt_snapshot_find(s, "contacts/crushed")) return;
-    const int64_t n = bt_snapshot_rows(s, "contacts/a");
-    double *impulse = bt_alloc(2 * (size_t)n, sizeof *impulse), *friction = bt_alloc((size_t)n, sizeof *friction);
-    uint8_t *crushed = bt_alloc((size_t)n, 1);
-    bt_snapshot_take(s, "contacts/impulse", BT_ITEM_F64, n, 2, impulse);
-    bt_snapshot_take(s, "contacts/friction", BT_ITEM_F64, n, 1, friction);
-    bt_snapshot_take(s, "contacts/crushed", BT_ITEM_U8, n, 1, crushed);
-    double *value = bt_snapshot_begin(s, "contacts/value", BT_ITEM_F64, n, 4);
-    uint16_t *law = bt_snapshot_begin(s, "contacts/law", BT_ITEM_U16, n, 1);
-    for (int64_t k = 0; k < n && !s->faulty; k++) {
-        value[4 * k] = impulse[2 * k], value[4 * k + 1] = impulse[2 * k + 1], value[4 * k + 2] = friction[k];
-        law[k] = crushed[k] ? BT_LAW_CRUSHING : BT_LAW_RIGID;
-    }
-    free(impulse);
-    free(friction);
-    free(crushed);
-}
-
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
 static void blank(bt_memory *t)
 {
@@ -382,7 +336,7 @@ static char *added_laws(const bt_world *w)
 /// Records name their law by its number, and the numbers of added laws follow from the order of their registration.
 static void check_added_laws(const bt_world *w, bt_snapshot *s)
 {
-    if (!bt_snapshot_find(s, ADDED_LAWS)) return; // none, or a checkpoint of before they were named
+    if (!bt_snapshot_find(s, ADDED_LAWS)) return; // none
     const char *then = bt_snapshot_text(s, ADDED_LAWS);
     char *now = added_laws(w);
     if (strcmp(now, then) && s->err)
@@ -412,7 +366,7 @@ static char *added_forces(const bt_forces *f)
 /// come later are welcome.
 static void load_added_forces(bt_forces *f, bt_snapshot *s)
 {
-    if (!bt_snapshot_find(s, ADDED_FORCES)) return; // none, or a checkpoint of before they were named
+    if (!bt_snapshot_find(s, ADDED_FORCES)) return; // none
     const char *then = bt_snapshot_text(s, ADDED_FORCES), *next = then;
     for (int k = BT_LISTED_LAWS; k < f->n && *next; k++) {
         const size_t n = strlen(bt_force_laws[k]->name);
@@ -471,13 +425,11 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
     bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
+    bt_snapshot_add_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
-    if (w->window) bt_snapshot_add_rows(s, "window", rear_rows, N_OF(rear_rows), w->window);
-    if (w->window) bt_snapshot_add_rows(s, "window", overtaken_rows, N_OF(overtaken_rows), w->window);
     if (w->undisturbed)
-        bt_snapshot_add_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
+        bt_snapshot_add_rows(s, "undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
     save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event,
                  w->events.n);
@@ -512,9 +464,7 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
     if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
     if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
-    if (!found) found = rows_not_finite("window", rear_rows, N_OF(rear_rows), w->window, name);
-    if (!found)
-        found = rows_not_finite(undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed, name);
+    if (!found) found = rows_not_finite("undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed, name);
     const bt_impacts *m = w->impacts;
     if (found || !m) return found;
     if (!bt_state_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
@@ -545,17 +495,11 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
     load_bodies(w, s);
-    bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
+    bt_snapshot_take_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
-    if (w->window && bt_snapshot_find(s, "window/most"))
-        bt_snapshot_take_rows(s, "window", overtaken_rows, N_OF(overtaken_rows), w->window);
-    // A checkpoint of before it was followed without a window: from here on, as it began.
-    if (w->undisturbed && (w->window || bt_snapshot_find(s, "undisturbed/vel")))
-        bt_snapshot_take_rows(s, undisturbed_of(w), undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
-    const bool ground = w->window && bt_snapshot_find(s, "window/rear");
-    if (w->window) bt_snapshot_take_rows(s, "window", ground ? ground_rows : rear_rows, 1, w->window);
-    if (ground) w->window->rear -= w->window->sign * w->undisturbed->drift_x;
+    if (w->undisturbed)
+        bt_snapshot_take_rows(s, "undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts && c->rank == 0) {
         free(w->impacts->open);
         w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);
@@ -566,7 +510,6 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
         load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
     w->events.cap = w->events.n;
     int64_t n = -1;
-    renew_contacts(s);
     if (!s->faulty) check_added_laws(w, s);
     if (!s->faulty) load_added_forces(w->forces, s);
     bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
@@ -642,11 +585,8 @@ static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, co
 static void save_field_head(const bt_field *f, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
-    bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
-    bt_snapshot_add_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
-    bt_snapshot_add_rows(s, "region", region_rows, N_OF(region_rows), f);
-    bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
-    bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
+    bt_snapshot_add_text(s, "field/crs", f->outlines.crs);
+    bt_snapshot_add_text(s, "field/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
 }
 
@@ -669,18 +609,8 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
     bt_field_init(f);
     int64_t n = 0, n_vertices = 0;
     bt_snapshot_take_rows(s, "field", field_rows, N_OF(field_rows), f);
-    if (bt_snapshot_find(s, "map/crs")) {
-        bt_snapshot_take_rows(s, "map", map_rows, N_OF(map_rows), f);
-        snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "map/crs"));
-        snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "map/nearly"));
-    } else {
-        f->outlines.east = f->outlines.north = NAN;
-        if (f->outlines.read)
-            snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
-    }
-    if (bt_snapshot_find(s, "ice/bare")) bt_snapshot_take_rows(s, "ice", ice_rows, N_OF(ice_rows), f);
-    else f->outlines.bare = f->outlines.read; // not known: no warning
-    if (bt_snapshot_find(s, "region/x_min")) bt_snapshot_take_rows(s, "region", region_rows, N_OF(region_rows), f);
+    snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "field/crs"));
+    snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "field/nearly"));
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
     f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);

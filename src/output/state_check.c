@@ -116,8 +116,8 @@ static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cell
 
 static void check_cells(const bt_world *w, bt_snapshot *s)
 {
-    static const cell_names x = {"tiles/x0", "tiles/side_x", "tiles/wrap_x", "tiles/low_x", "tiles/n_x"},
-                            y = {"tiles/y0", "tiles/side_y", "tiles/wrap_y", "tiles/low_y", "tiles/n_y"};
+    static const cell_names x = {"cells/x0", "cells/side_x", "cells/wrap_x", "cells/low_x", "cells/n_x"},
+                            y = {"cells/y0", "cells/side_y", "cells/wrap_y", "cells/low_y", "cells/n_y"};
     const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     double widest = 0;
@@ -129,18 +129,18 @@ static void check_cells(const bt_world *w, bt_snapshot *s)
     }
     check_direction(s, &x, in_cells, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
     check_direction(s, &y, in_cells, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
-    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "tiles/n_x", -1,
+    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "cells/n_x", -1,
                      "and n_y are more cells than are made for so many floes");
-    bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "tiles/margin_max", -1, "is no margin");
+    bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "cells/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.
-    bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "tiles/reach", -1,
+    bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "cells/reach", -1,
                      "is less than the radius of a floe");
-    bt_snapshot_want(s, isfinite(t->heaviest) && t->heaviest >= 0, "tiles/heaviest", -1, "is no mass");
-    bt_snapshot_want(s, counts(t->n_labellings), "tiles/n_labellings", -1, "is no count");
+    bt_snapshot_want(s, isfinite(t->heaviest) && t->heaviest >= 0, "cells/heaviest", -1, "is no mass");
+    bt_snapshot_want(s, counts(t->n_labellings), "cells/n_labellings", -1, "is no count");
     double slack = INFINITY;
     if (t->wrap_x != 1) slack = bt_min(slack, t->side_x - 2 * t->reach - t->margin_max);
     if (t->wrap_y != 1) slack = bt_min(slack, t->side_y - 2 * t->reach - t->margin_max);
-    bt_snapshot_want(s, slack > 0 && t->allowance == 0.5 * slack, "tiles/allowance", -1,
+    bt_snapshot_want(s, slack > 0 && t->allowance == 0.5 * slack, "cells/allowance", -1,
                      "is not what sides, reach and margin leave");
 }
 
@@ -170,8 +170,8 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, copy >= -FAR && copy <= FAR, "bodies/copy", g, "is out of range");
         bt_snapshot_want(s, b->lap[i] >= -FAR && b->lap[i] <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
-        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the cells");
-        bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/tile", g,
+        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/cell", g, "is outside the box of the cells");
+        bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/cell", g,
                          "is too far from where the floe is");
     }
 }
@@ -249,12 +249,12 @@ static void check_undisturbed(const bt_world *w, bt_snapshot *s)
     const bt_undisturbed *v = w->undisturbed;
     const double real[] = {v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
     bt_snapshot_want(s, bt_state_finite(real, sizeof real / sizeof *real),
-                     w->window ? "window/drift_x" : "undisturbed/drift_x", -1,
+                     "undisturbed/drift_x", -1,
                      "and what else belongs to undisturbed ice are not all finite");
     if (!w->window) return;
-    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
-    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
-                     "is out of range");
+    bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "undisturbed/drift_x", -1, "is out of range");
+    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "undisturbed/drift_y",
+                     -1, "is out of range");
 }
 
 static bool is_gid(double x, bt_gid n) { return x >= 0 && x < (double)n && x == floor(x); }

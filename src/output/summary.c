@@ -143,10 +143,8 @@ static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals 
 }
 
 /// How the steps were solved.
-static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
+static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_run_totals *t)
 {
-    if (c->solver.turn_rows != BT_TURN_ROWS)
-        bt_warn(&s->warnings, BT_WARN_TURN_ROWS, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
         bt_warn(&s->warnings, BT_WARN_UNCONVERGED,
                 "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
@@ -339,7 +337,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     bt_ice_warn_closed(c, t->ice_area, &s->warnings);
     if (n_floes > 0) bt_ice_warn_slow(c, t->mean_size, &s->warnings);
     if (t->undisturbed) bt_case_warn_lead(c, t->undisturbed->drift_x, t->undisturbed->drift_y, &s->warnings);
-    warn_of_solver(s, h, c, t);
+    warn_of_solver(s, h, t);
     warn_of_bodies(s, h, c, t);
 }
 

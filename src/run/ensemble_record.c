@@ -148,11 +148,7 @@ static void report(const char *folder, const char *kept, const char *wanted, bt_
     static const char *const whose[] = {"name", "study"};
     char a[128], b[128];
     if (strncmp(kept, "bergtow finished member 1\n", 26)) {
-        bt_errors_add(
-            err, "%s/%s: %s", folder, RECORD,
-            *kept
-                ? "is no record of a finished member"
-                : "is empty, as older versions of the program left it: nothing tells whether the result is as it was");
+        bt_errors_add(err, "%s/%s: is no record of a finished member", folder, RECORD);
         return;
     }
     for (int k = 0; k < 2; k++) {

@@ -49,12 +49,12 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
 }
 
 /// Rank 0. Before the case is read: what is wrong in one that was edited is of no concern.
-static bt_status check_itself(const char *path, const char *dir, bt_errors *warnings, bt_errors *err)
+static bt_status check_itself(const char *path, const char *dir, bt_errors *err)
 {
     char *text = NULL;
     size_t size = 0;
     bt_status status = bt_file_read(path, "a case", &text, &size, err);
-    if (status == BT_OK) status = bt_case_itself_same(path, text, dir, warnings, err);
+    if (status == BT_OK) status = bt_case_itself_same(path, text, dir, err);
     free(text);
     return status;
 }
@@ -63,13 +63,10 @@ static bt_status check_itself(const char *path, const char *dir, bt_errors *warn
 static bt_status start_again(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
 {
     char *path = bt_file_join(o->dir, "case.resolved.yml");
-    bt_errors warnings = {0};
-    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, o->dir, &warnings, err) : BT_OK);
+    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, o->dir, err) : BT_OK);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
-    if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&k->c, o->dir, &warnings, err);
+    if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&k->c, o->dir, err);
     status = bt_comm_agree(comm, status);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
     if (status == BT_OK && comm->rank == 0 && !o->quiet)
         printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
     free(path);

@@ -85,7 +85,7 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
 
 /// What tells a run from others: a digest of what it begins with, the resolved case, the tables of current and wind and
 /// the ice as made. Those of the same case are alike, and may take each other's place. kept: the checkpoint, which has
-/// it unless an earlier version wrote it, or NULL. The caller frees it.
+/// it, or NULL. The caller frees it.
 char *bt_running_identity(const bt_case *c, const bt_field *f, bt_snapshot *kept);
 
 /// Time between frames, s.

@@ -61,7 +61,7 @@ static void add_digest(bt_text *t, const void *numbers, int64_t n)
 
 char *bt_running_identity(const bt_case *c, const bt_field *f, bt_snapshot *kept)
 {
-    if (kept && bt_snapshot_find(kept, "about/run")) return bt_text_copy(bt_snapshot_text(kept, "about/run"));
+    if (kept) return bt_text_copy(bt_snapshot_text(kept, "about/run"));
     char *resolved = bt_case_resolved(c), digest[BT_CHECKSUM_DIGEST];
     bt_text t;
     bt_text_begin(&t);
@@ -201,11 +201,9 @@ bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err)
     r->frames_due = bt_snapshot_int(s, "run/frames_due");
     r->frames = bt_snapshot_int(s, "record/frames");
     r->guard.in_a_row = bt_snapshot_int(s, "run/unconverged_in_a_row");
-    r->guard.locked = bt_snapshot_find(s, "run/locked_steps") ? bt_snapshot_int(s, "run/locked_steps") : 0;
-    const bool limited = bt_snapshot_find(s, "run/energy_limit"); // not in checkpoints of before
-    r->guard.energy = limited ? bt_snapshot_real(s, "run/energy_limit") : 0;
-    const bool earlier = bt_snapshot_rows(s, "clock/phases") == N_PHASES - 1; // before the projection had its own
-    bt_snapshot_take(s, "clock/phases", BT_ITEM_F64, N_PHASES - earlier, 1, &r->totals.phases);
+    r->guard.locked = bt_snapshot_int(s, "run/locked_steps");
+    r->guard.energy = bt_snapshot_real(s, "run/energy_limit");
+    bt_snapshot_take(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
     r->totals.wall_time = bt_snapshot_real(s, "clock/wall_time");
     check_counters(r, s);
     return bt_state_load(r->w, r->comm, s, err);

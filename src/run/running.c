@@ -309,7 +309,7 @@ static void step_at_pace(bt_world *w, bt_pace *p)
     const bt_lock lock = w->stats.converged ? (bt_lock){0} : bt_locked(w);
     w->stats.locked = lock.found;
     w->stats.no_load = lock.towed;
-    bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
+    bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.contact_updates);
 }
 
 static void warn(const char *text, int64_t step)
@@ -381,8 +381,8 @@ static void note_division(run *r)
     r->totals.divisions = s.divisions;
     r->totals.imbalance = s.imbalance;
     r->totals.worst_imbalance = s.worst_imbalance;
-    r->totals.dealt_imbalance = s.dealt_imbalance;
-    r->totals.worst_dealt_imbalance = s.worst_dealt_imbalance;
+    r->totals.repartition_imbalance = s.repartition_imbalance;
+    r->totals.worst_repartition_imbalance = s.worst_repartition_imbalance;
     r->totals.edge_cut = s.cut;
     r->totals.halo_share = s.halo;
     bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);

@@ -51,7 +51,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .plain_sweeps = c->solver.plain,
         .plain_schedule = c->solver.plain_schedule,
         .inner_sweeps = c->solver.inner_sweeps,
-        .cell = c->solver.cell,
+        .cell = c->solver.cell_size,
         .slop = c->solver.slop * size,
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,

@@ -168,11 +168,8 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
         fprintf(out, "%s:", s->parameter[p].name);
         const bt_study_parameter *q = &s->parameter[p];
         if (q->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-            // studies of earlier versions drew whole numbers otherwise, and are others
-            fprintf(out, " %s%s from %.17g to %.17g", bt_study_is_whole(q) ? "whole numbers, " : "",
-                    q->logarithmic ? "log" : "linear", q->from, q->to);
-            // uniform is not named: studies of earlier versions go on
-            if (q->distribution != BT_UNIFORM) fprintf(out, ", %s", bt_distribution_name(q->distribution));
+            fprintf(out, " %s%s from %.17g to %.17g, %s", bt_study_is_whole(q) ? "whole numbers, " : "",
+                    q->logarithmic ? "log" : "linear", q->from, q->to, bt_distribution_name(q->distribution));
         } else
             for (int i = 0; i < s->parameter[p].n; i++) fprintf(out, "%s %s", i ? "," : "", s->parameter[p].value[i]);
         fputc('\n', out);

@@ -4,8 +4,7 @@
 //
 //     /home/me/current.csv: 312 bytes, xxh128 0123...
 //
-// Members made before and after a change of such a file are of two studies. Rejected: these lines in study.resolved.yml
-// itself, by whose digest members are recorded: those of earlier versions of the program would not be sound any more.
+// Members made before and after a change of such a file are of two studies.
 #ifndef BT_STUDY_FILES_H
 #define BT_STUDY_FILES_H
 

@@ -342,8 +342,8 @@ static void sweep_to_tolerance(bt_world *w)
     }
     if (work.residual > p.tolerance) bt_rounds_run(w, &p, &work);
     st->sweeps += work.sweeps;
-    st->unit_updates += work.updates;
-    st->unit_moves += work.moves;
+    st->contact_updates += work.updates;
+    st->contact_moves += work.moves;
     st->residual_checks += work.checks;
     st->residual = work.residual;
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
@@ -358,7 +358,7 @@ void bt_solver_solve(bt_world *w)
     st->restitution_cut = false;
     // the displacements of the last step are over, and their array is of the bodies that were here then
     s->shifted = false;
-    st->sweeps = st->unit_updates = st->unit_moves = st->residual_checks = 0;
+    st->sweeps = st->contact_updates = st->contact_moves = st->residual_checks = 0;
     s->rebounds = bt_restitution_begin(w);
     for (;;) {
         sweep_to_tolerance(w);

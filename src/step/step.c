@@ -227,8 +227,8 @@ static void solve_contacts(bt_world *w)
         clock_phase(w, &st->phases.detect, &t0);
         bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
         sweeps += st->sweeps;
-        updates += st->unit_updates;
-        moves += st->unit_moves;
+        updates += st->contact_updates;
+        moves += st->contact_moves;
         checks += st->residual_checks;
         st->misjudged = st->converged ? bt_passing_review(w, round < MAX_RELEASES) : 0;
         clock_phase(w, &st->phases.solve, &t0);
@@ -247,8 +247,8 @@ static void solve_contacts(bt_world *w)
     clock_phase(w, &st->phases.detect, &t0);
     st->phases.detect -= st->phases.colour; // which it holds
     st->sweeps = sweeps;
-    st->unit_updates = updates;
-    st->unit_moves = moves;
+    st->contact_updates = updates;
+    st->contact_moves = moves;
     st->residual_checks = checks;
 }
 

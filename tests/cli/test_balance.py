@@ -304,7 +304,7 @@ def test_work_that_is_positive_is_reported(tmp_path):
 
 def test_unconverged_steps_are_reported(tmp_path):
     r = run(tmp_path, changed(TOW, solver__max_sweeps=2))
-    unconverged, residual, sweeps, updates = r.series("unconverged", "residual", "sweeps", "unit_updates")
+    unconverged, residual, sweeps, updates = r.series("unconverged", "residual", "sweeps", "contact_updates")
     n = r.summary["unconverged_steps"]
     assert n == unconverged.sum() > 10
     assert n == np.sum(residual > 0.13 * 1e-3)
@@ -312,7 +312,7 @@ def test_unconverged_steps_are_reported(tmp_path):
     # more, which the last sweep may pass by two turns; a step that outruns its margin is solved again, at most four
     # times. No step here takes more than three for each sweep and solution.
     assert np.all(updates <= 5 * (3 * 2 + 2) * r.series("contacts"))
-    assert r.summary["mean_unit_updates"] == pytest.approx(
+    assert r.summary["mean_contact_updates"] == pytest.approx(
         updates.mean()) and r.summary["mean_sweeps"] == pytest.approx(sweeps.mean())
     plain = run(tmp_path, changed(TOW, solver__max_sweeps=2, solver__plain=True), name="plain")
     swept, moved = plain.series("sweeps", "momentum_moves")
@@ -556,12 +556,3 @@ def test_drift_with_the_current(tmp_path):
     assert vy[-1] / vx[-1] == pytest.approx(-2, rel=1e-6)
     assert 0.15 < vx[-1] < 0.2
     assert floe[1] / floe[0] == pytest.approx(-2, rel=1e-6)
-
-
-def test_a_key_of_earlier_versions_has_no_effect(tmp_path):
-    """Cases, and resolved cases in result folders, that name solver.turn_rows still run."""
-    short = changed(TOW, run__duration=2)
-    old = run(tmp_path, changed(short, solver__turn_rows=1), name="old")
-    new = run(tmp_path, short, name="new")
-    assert old.summary["state_hash"] == new.summary["state_hash"]
-    assert warned(old, "turn_rows no longer has an effect; take it out") and not warned(new, "turn_rows")

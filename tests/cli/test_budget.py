@@ -264,7 +264,7 @@ def loaded(folder, parted=None):
     for i in range(20):
         x, event = 100.0 + 5 * i + rng.random(400), [{"kind": "adrift", "time_s": 200, "subject": 0, "value": 0}]
         x[200:] -= 90 * (i == parted)
-        more = {"tow_force": 3 * x, "ice_resistance": x, "largest_push": 50 * rng.random(400),
+        more = {"tow_force": 3 * x, "ice_resistance": x, "largest_quasi_static_load": 50 * rng.random(400),
                 "impact_peak": 90 * rng.random(400)}
         members.append(made_up.member(x, {"ice.friction": (i // 2 + 0.5) / 10}, i // 2, more=more, attributes=SERIES,
                                       summary={"mean_tow_force_n": 3 * x.mean(), "events": event * (i == parted)}))
@@ -278,7 +278,7 @@ def test_numbers_are_those_of_the_loads_and_the_computation_that_of_the_ice_resi
     known = {"sd": 0.01, "biases": {"dt": -0.3}, "unknown": {}}
     found = budget.of_ensemble(e, "floe_force:99")
     assert found["mean"] == pytest.approx(np.mean([np.percentile(np.maximum(*(
-        Run(e.folder(m))[name] for name in ("largest_push", "impact_peak"))), 99) for m in range(20)]))
+        Run(e.folder(m))[name] for name in ("largest_quasi_static_load", "impact_peak"))), 99) for m in range(20)]))
     assert "moving mean" not in found["meaning"] and "is by half-sine of 0.1 s" in found["meaning"]
     assert budget.of_ensemble(e, computed=known)["numerics"]["bias"] < -0.3
     other = budget.of_ensemble(e, "mean_tow_force_n", known)

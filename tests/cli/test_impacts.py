@@ -160,7 +160,8 @@ def test_without_a_window_all_is_the_starts(tmp_path):
     r = run(tmp_path, changed(LINE, run__duration=15, tow__ramp=20, output={"panels": True}))
     s = r.summary["impacts"]
     assert r.summary["window"]["verdict"] == "too short" and s["collisions"] == 0 < s["collisions_whole_run"]
-    assert [s[k] for k in ("from_s", "largest", "largest_push_n", "mean_push_resistance_n", "collisions_per_hour")
+    assert [s[k] for k in ("from_s", "largest", "largest_quasi_static_load_n", "mean_quasi_static_resistance_n",
+                              "collisions_per_hour")
             ] == [None] * 5
     with h5py.File(r.dir / "result.h5") as f:
         p = f["panels"]
@@ -241,7 +242,8 @@ def test_none_tells_nothing_and_changes_nothing(line, tmp_path):
     with h5py.File(r.dir / "result.h5") as f:
         assert "impacts" not in f and "panels" not in f
         assert np.all(np.isnan(f["series/collisions"][:])) and np.all(np.isnan(f["series/collision_resistance"][:]))
-    reported = {f"/series/{n}" for n in ("collisions", "collision_resistance", "impact_peak", "largest_push")}
+    reported = {f"/series/{n}" for n in ("collisions", "collision_resistance", "impact_peak",
+                                           "largest_quasi_static_load")}
     assert {
         n
         for n in differing(line.dir / "result.h5", r.dir / "result.h5", but=("/case", "/case_as_given"))

@@ -357,7 +357,7 @@ SERIES = {
     "line_tension_2": {"units": "N", "description": "second branch", "label": "tension of the second branch",
                        "role": "load", "needs": "bridle", "order": 4},
     "vessel_thrust": {"units": "N", "description": "thrust", "label": "vessel thrust", "role": "load", "order": 5},
-    "largest_push": {"units": "N", "description": "push", "label": "", "role": "", "order": 6},
+    "largest_quasi_static_load": {"units": "N", "description": "push", "label": "", "role": "", "order": 6},
     "impact_peak": {"units": "N", "description": "peak", "label": "", "role": "", "order": 7},
 }
 CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load} N\nice:\n  thickness: 1 m\n"
@@ -376,7 +376,8 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
                       "domain_body_widths_needed": 60 if dense else np.nan}
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
                       "line_tension_2": (0.98 + 0.05 * c) * x,
-                      "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
+                      "vessel_thrust": np.full(N, np.nan),
+                      "largest_quasi_static_load": np.where(np.arange(N) < 30, 1e9, 1e5),
                       "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
             members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, more=series,
                                           attributes=SERIES, summary={"concentration": a, **domain},

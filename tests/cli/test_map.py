@@ -180,37 +180,10 @@ def test_what_came_in_a_projection_goes_out_in_it(tmp_path, frame):
         assert same_ring(p, q, 1e-8)
 
 
-def test_files_of_before_are_read_as_they_were_written(tmp_path):
-    """Metres x, y of the frame, by the mark of the version that wrote them."""
-    mark = {"bergtow": {"version": "0.5.0", "coordinates": "metres", "frame": "geographic", "ice_area_m2": 1}}
-    write(tmp_path, seen("geographic", ARROW), **mark)
-    for more in ({}, {"ice__outlines_crs": "metres"}, {"ice__outlines_crs": "frame"}):
-        rings, *_ = field(tmp_path, changed(FRAMES["geographic"], **more))
-        assert same_ring(rings[0], seen("geographic", ARROW), 1e-12)
-    assert "frame geographic" in field(tmp_path, FRAMES["basin"], code=CASE)
-    assert "remove ice.outlines_crs: lonlat" in field(tmp_path, changed(FRAMES["geographic"],
-                                                                        ice__outlines_crs="lonlat"), code=CASE)
-
-
-def test_the_old_name_of_metres(tmp_path):
-    """In the basin it is what it was; in the geographic frame it was [north, east], and a case says now which it
-    means."""
-    write(tmp_path, ARROW)
-    rings, *_ = field(tmp_path, changed(FRAMES["basin"], ice__outlines_crs="metres"))
-    assert same_ring(rings[0], ARROW, 1e-12)
-    said = field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="metres"), code=CASE)
-    assert "[x, y] = [north, east]" in said and "plane" in said and "frame" in said
+def test_metres_of_the_frame(tmp_path):
     write(tmp_path, seen("geographic", ARROW))
     rings, *_ = field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="frame"))
     assert same_ring(rings[0], seen("geographic", ARROW), 1e-12)
-
-
-def test_a_resolved_case_of_before_runs(tmp_path):
-    """Without outlines it says metres all the same."""
-    call("check", write_case(tmp_path, changed(FRAMES["basin"], ice={"concentration": 0, "outlines_crs": "metres"})))
-    r = run(tmp_path, changed(FRAMES["basin"], ice={"concentration": 0.1, "size": 20, "outlines_crs": "metres"}))
-    again = run(tmp_path, r.dir / "case.resolved.yml", name="again")
-    assert again.hash == r.hash
 
 
 # ---- the file's crs ----

@@ -156,8 +156,8 @@ def test_every_number_of_the_summary_is_listed(left):
     assert all(k["description"] and (k["units"] or not k["number"]) for k in quantities["summary"])
     assert {k["name"].split(".")[0] for k in quantities["summary"] if k["machine"]} == {
         "wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "threads", "divisions", "moved_floes", "imbalance",
-        "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance", "edge_cut", "halo_share", "memory_per_floe_b",
-        "sweep_bytes_per_contact", "call_s"
+        "worst_imbalance", "repartition_imbalance", "worst_repartition_imbalance", "edge_cut", "halo_share",
+        "memory_per_floe_b", "sweep_bytes_per_contact", "call_s"
     }
 
 
@@ -258,27 +258,6 @@ def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_
     figure = plot_ensemble.draw_sweep(e, "ice.concentration")
     assert "energy of the strip" in [t.get_text() for t in figure.legends[0].get_texts()]
     assert "energy of the strip" in json.dumps(str(report_ensemble.context(ensemble)))
-
-
-def test_files_of_an_earlier_version_are_read(ensemble, tmp_path):
-    """Without attributes and labels the names are those of the columns, and what comes on top has no ratio."""
-    folder, _ = of_run(tmp_path, BERGTOW, SPEED)
-    with h5py.File(folder / "result.h5", "r+") as f:
-        for data in f["series"].values():
-            for key in ("role", "label", "summary", "order"):
-                data.attrs.pop(key, None)
-    summary = json.loads((folder / "summary.json").read_text())
-    (folder / "summary.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "estimate_labels"}))
-    with Run(folder) as run:
-        assert [e.name for e in run.estimates.values() if e.on_top] == ["open_water_drag"] and len(
-            run.estimates) == len(listed()["estimates"])
-        drawn = [t.get_text() for t in plot_force.draw(run).axes[1].get_legend().get_texts()]
-        assert drawn[:2] == ["tow force", "ice resistance"] and "drag force" in drawn
-        assert len(report_run.forces(run)) > 5
-    e = Ensemble(ensemble)
-    e.meaning = {key: {} for key in e.meaning}
-    e.__dict__.pop("estimates", None)
-    assert [name for name, estimate in e.estimates.items() if estimate["on_top"]] == ["open_water_drag"]
 
 
 # ---- what the examples compute

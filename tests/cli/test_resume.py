@@ -14,6 +14,7 @@ import pytest
 
 from harness import (BERGTOW, CASE as REFUSED, DONE, FAULT, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed,
                      environment, heard, quick, run, write_case)
+from made_up_ensemble import seal
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -167,7 +168,7 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
 
 
 def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
-    """The run starts again by it, and would be another one. case.resolved.yml of earlier versions does not tell."""
+    """The run starts again by it, and would be another one."""
     table, resolved = tmp_path / "wind.csv", tmp_path / "out/case.resolved.yml"
     table.write_text("t,u,v\n0,1,0\n40,-2,3\n")
     write_case(tmp_path, changed(LONG, air__wind_table="wind.csv"))
@@ -180,7 +181,7 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     kept = shutil.copytree(tmp_path / "out", tmp_path / "kept")
     assert resumed(tmp_path, "kept", "--steps", 2) == "" and (kept / "checkpoint.h5").exists()
     resolved.write_text(re.sub("# air.wind_table: .*", "", resolved.read_text()))
-    assert f"warning: {table}: nothing in out tells what it held" in resumed(tmp_path, "out", "--steps", 2)
+    assert f"{table}: has changed since the run in out began" in resumed(tmp_path, "out", code=REFUSED)
 
 
 @pytest.mark.parametrize("arguments, code, text", [
@@ -248,8 +249,7 @@ def opened_to_change_it(path):
 
 
 def of_an_earlier_format(path):
-    seal = b"bergtow sealed file\nkind: checkpoint 2\nbytes: 9\n"
-    path.write_bytes(seal.ljust(512, b"\0") + path.read_bytes()[:-128])
+    path.write_bytes(re.sub(rb"kind: checkpoint \d+", b"kind: checkpoint 4", path.read_bytes()))
 
 
 ENDS = {
@@ -262,7 +262,7 @@ ENDS = {
     "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
     "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is no checkpoint file of this program"),
     "empty": (lambda path: path.write_bytes(b""), "is no checkpoint file of this program"),
-    "earlier": (of_an_earlier_format, r'has the format "checkpoint 2", this program reads "checkpoint \d+"'),
+    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", this program reads "checkpoint \d+"'),
 }
 
 
@@ -276,6 +276,33 @@ def test_a_checkpoint_tells_how_it_ends(stopped):
         damage(path)
         error = resumed(folder, "out", code=REFUSED)
         assert re.search(rf"checkpoint.h5: ({says})", error), (name, error)
+
+
+@pytest.mark.parametrize("damage, says", [
+    (lambda f: f.create_dataset("numbers", data=[1.0, 2.0]), "holds what this program does not write"),
+    (lambda f: f.pop("contacts/value"), "/contacts/value is missing"),
+    (lambda f: f.pop("history/body_yaw"), "/history/body_yaw is missing"),
+    (lambda f: f.pop("history/locked_steps"), "/history/locked_steps is missing"),
+    (lambda f: f.pop("undisturbed/vel"), "/undisturbed/vel is missing"),
+    (lambda f: f.pop("field/bare"), "/field/bare is missing"),
+    (lambda f: f.pop("run/energy_limit"), "/run/energy_limit is missing")])
+def test_what_is_missing_or_too_much_in_a_checkpoint_is_named(stopped, damage, says):
+    """Red where a member that is not there is taken for one that a run had not."""
+    folder, _ = stopped
+    (folder / "out/checkpoint.previous.h5").unlink()
+    with h5py.File(folder / "out/checkpoint.h5", "r+") as f:
+        damage(f)
+    seal(folder / "out/checkpoint.h5")
+    assert says in resumed(folder, "out", code=REFUSED)
+
+
+@pytest.mark.parametrize("name", ["series/body_yaw", "series/rafted_area", "frames/velocity"])
+def test_what_is_missing_in_a_result_is_named(stopped, name):
+    folder, _ = stopped
+    with h5py.File(folder / "out/result.h5", "r+") as f:
+        del f[name]
+    seal(folder / "out/result.h5")
+    assert f"/{name}" in resumed(folder, "out", code=REFUSED)
 
 
 def test_a_damaged_result_is_not_continued(stopped):

@@ -28,13 +28,13 @@ static const struct { const char *text; int64_t steps;
      "crushing: {pressure: 20 kPa}}\nbody: {x: 3, length: 1}\n"
      "tow: {mode: line, speed: 0.5, ramp: 0, line_length: 2, line: {branches: 2}, branch2: {breaking_load: 1}, "
      "waypoints: [[5.2, 0], [8, 1]]}\n"
-     "output: {panels: true, sample_every: 3, frame_interval: 0.5}\nsolver: {tile: 2.5, max_sweeps: 20}\n",
+     "output: {panels: true, sample_every: 3, frame_interval: 0.5}\nsolver: {cell_size: 2.5, max_sweeps: 20}\n",
      14},
     {"run: {dt: 0.125, duration: 5}\ndomain: {frame: geographic, length: 20, width: 8, ends: moving, sides: periodic, "
      "ahead: 10}\nice: {concentration: 0.3, size: 1.5, thickness: 0.04}\n"
      "body: {length: 2, draft: 0.5}\ntow: {mode: thrust, speed: 1.5, ramp: 0.5, line_length: 3, line_stiffness: 10 kN, "
      "line_damping: 100, vessel: {mass: 800, bollard_pull: 600, free_speed: 3}}\n"
-     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\nair: {wind_x: 5}\nsolver: {tile: 2, "
+     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\nair: {wind_x: 5}\nsolver: {cell_size: 2, "
      "max_sweeps: 20}\n",
      24},
     {"run: {dt: 0.1, duration: 2}\ndomain: {length: 8, width: 8, ends: periodic, sides: open}\nice: {concentration: "

@@ -3,7 +3,7 @@
 that breaks, way-points, tide, wind, dynamic tilt, loads on the hull. Each has a test of its own; here one meets the
 other.
 
-What turned this test red when it was written: an overlap of −0 on one rank and of 0 on two, where a tile had no other
+What turned this test red when it was written: an overlap of −0 on one rank and of 0 on two, where a cell had no other
 contacts than one that just touched.
 """
 import json
@@ -33,7 +33,7 @@ ALL = {
     },
     "air": {"wind_x": -3, "wind_y": 3},
     "impact": {"conversion": "crushing", "pressure": "20 kPa"},
-    "solver": {"tile": 2.5, "max_sweeps": 40, "rest_speed": 1e-3},
+    "solver": {"cell_size": 2.5, "max_sweeps": 40, "rest_speed": 1e-3},
     "output": {"frame_interval": 6, "panels": True},
 }
 

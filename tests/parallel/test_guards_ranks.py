@@ -8,7 +8,7 @@ import pytest
 from harness import CLOSING, DONE, NUMERIC, changed, run, write_case
 from test_ranks_output import mpirun, ours
 
-# Longer, so that there are tiles for all.
+# Longer, so that there are cells for all.
 WIDE = {"domain__length": 16, "domain__width": 9}
 
 

@@ -10,8 +10,8 @@ from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, l
 from resuming import assert_same_result, done
 
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
-# A body of infinite mass, whose contacts lie in the tiles of the floes, and a free one, whose contacts are one rank's.
-# The first is broad and in many tiles: it hits several floes in a step, found by several threads and ranks.
+# A body of infinite mass, whose contacts lie in the cells of the floes, and a free one, whose contacts are one rank's.
+# The first is broad and in many cells: it hits several floes in a step, found by several threads and ranks.
 CASES = {
     "speed": changed(TOW,
                      **KEPT,

@@ -22,7 +22,7 @@ GROUNDS = {
     },
     "body": {"x": 4, "length": 2},
     "tow": {"mode": "line", "speed": 0.5, "ramp": 1, "line_length": 2},
-    "solver": {"tile": 2, "max_sweeps": 30},
+    "solver": {"cell_size": 2, "max_sweeps": 30},
     "output": {"frame_interval": 2.5},
 }
 PERIODIC = changed(GROUNDS,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The numbers of the floes order the contacts of a tile, and so decide which of many solutions within the tolerance is
+"""The numbers of the floes order the contacts of a cell, and so decide which of many solutions within the tolerance is
 found. That must not show in the mean force: it may differ by no more than its standard error."""
 import h5py
 import numpy as np

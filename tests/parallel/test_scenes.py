@@ -34,9 +34,7 @@ def both():
 def test_scene_is_what_it_was(tmp_path, name, layout):
     items = scenes.run_scene(tmp_path, name, scenes.layouts_of(name)[layout])
     assert name in STORED, f"nothing stored: tests/scenes.py --record {name}"
-    want, found = STORED[name], scenes.digests(items)
-    gone, new = sorted(want.keys() - found.keys()), sorted(found.keys() - want.keys())
-    moved = sorted(i for i in want if i in found and want[i] != found[i])
+    gone, new, moved = scenes.departed(name, items)
     assert (gone, new, moved) == ([], [], []), (f"gone: {gone}\nnew: {new}\nchanged: {moved}\n"
                                                 "tests/scenes.py --compare shows how, --record takes it over")
 

@@ -11,7 +11,7 @@ import pytest
 from harness import CASE, DONE, TOW, VALIDATE, call, changed, differing, run, warned
 from test_ranks import assert_same, many
 
-# Two laps and a half through loose ice with small tiles, with and without a line, towards either end.
+# Two laps and a half through loose ice with small cells, with and without a line, towards either end.
 SPEED = {
     "run": {"dt": 0.125, "duration": 70},
     "domain": {"length": 26, "width": 18, "ends": "moving", "sides": "periodic"},
@@ -21,7 +21,7 @@ SPEED = {
     },
     "body": {"length": 2, "draft": 0.5},
     "tow": {"speed": 0.8, "ramp": 1},
-    "solver": {"tile": 2.5, "max_sweeps": 40},
+    "solver": {"cell_size": 2.5, "max_sweeps": 40},
     "output": {"frame_interval": 8},
 }
 # On a line, the other way, in the geographic frame, under every force: the field drifts.

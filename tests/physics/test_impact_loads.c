@@ -43,18 +43,18 @@ static void set_contact(bt_world *w, double e, double mu)
     w->bodies.friction[bt_world_towed(w)] = mu;
 }
 
-static double largest_push; ///< of the steps of the last call of run, N
+static double largest_quasi_static_load; ///< of the steps of the last call of run, N
 
 /// Collisions of `steps` steps, [0..10); returns how many there were.
 static int run(bt_world *w, int steps, bt_impact *out)
 {
     int n = 0;
-    largest_push = 0;
+    largest_quasi_static_load = 0;
     for (int s = 0; s < steps; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);
         for (int64_t i = 0; i < w->impacts->n_closed && n < 10; i++) out[n++] = w->impacts->closed[i];
-        largest_push = fmax(largest_push, w->impacts->largest_push);
+        largest_quasi_static_load = fmax(largest_quasi_static_load, w->impacts->largest_quasi_static_load);
     }
     return n;
 }
@@ -86,7 +86,7 @@ static void central_impact(void **state)
             CHECK_CLOSE(e[0].x, 5, 0.03); // half-way across the gap
             CHECK_CLOSE(e[0].y, 2, 1e-9);
             CHECK_CLOSE(e[0].thickness, 0.5, 1e-12);
-            CHECK_CLOSE(largest_push, 0, 1e-6 * impulse);
+            CHECK_CLOSE(largest_quasi_static_load, 0, 1e-6 * impulse);
             bt_world_free(w);
         }
 }
@@ -120,7 +120,7 @@ static void eccentric_impact(void **state)
         if (mu == 0) CHECK_CLOSE(hit[0].impulse, (1 + e) * speed / inverse, 1e-3 * speed / inverse);
         // Momentum of the floe along x is λ of the whole run.
         CHECK_CLOSE(hit[0].impulse, m * w->bodies.vel[bt_world_index(w, 0)].x, 1e-3 * speed * m);
-        CHECK_CLOSE(largest_push * p.dt, 0, 1e-3 * speed * m);
+        CHECK_CLOSE(largest_quasi_static_load * p.dt, 0, 1e-3 * speed * m);
         // Crushing: k = 2 p h tan(φ/2).
         const double k = 2 * 2e6 * 0.5 * tan(0.5), m_e = hit[0].mass, v = fmin(speed, hit[0].impulse / m_e);
         CHECK_CLOSE(hit[0].peak, v * sqrt(k * m_e), 1e-9 * hit[0].peak);
@@ -133,7 +133,7 @@ static void eccentric_impact(void **state)
 /// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and
 /// in λ, but the collision has the momentum of the mass alone, and the rest is quasi-static. From then on the contact
 /// carries k V².
-static void drag_is_push(void **state)
+static void drag_is_quasi_static(void **state)
 {
     (void)state;
     bt_params p = scene_params(0.5, 1);
@@ -148,7 +148,7 @@ static void drag_is_push(void **state)
     assert_int_equal(run(w, 1, hit), 1);
     CHECK_CLOSE(hit[0].impulse, sheet * (1 + speed), 1e-6 * sheet);
     CHECK_CLOSE(hit[0].mass, sheet, 1e-6);
-    CHECK_CLOSE(largest_push, 200 * 1 * speed, 1e-4); // K V, K = k |U1|
+    CHECK_CLOSE(largest_quasi_static_load, 200 * 1 * speed, 1e-4); // K V, K = k |U1|
     assert_int_equal(run(w, 30, hit), 0);
     bt_sample s;
     bt_observe(w, speed, &s);
@@ -208,7 +208,7 @@ static void body_against_a_wall(void **state)
 
 /// A floe lies against a body at rest and the wind presses on it: a quasi-static load of that force, never a collision;
 /// no matter with how many of its parts it lies there.
-static void static_push(void **state)
+static void static_load(void **state)
 {
     (void)state;
     for (int parts = 1; parts <= 2; parts++) {
@@ -230,7 +230,7 @@ static void static_push(void **state)
         assert_int_equal(run(w, 50, hit), 0);
         assert_int_equal(w->impacts->n_open, 0);
         assert_int_equal(w->impacts->n_contacts, parts);
-        CHECK_CLOSE(largest_push, 0.3 * 400, 1e-6);
+        CHECK_CLOSE(largest_quasi_static_load, 0.3 * 400, 1e-6);
         bt_sample s;
         bt_observe(w, speed, &s);
         CHECK_CLOSE(s.ice_resistance, 120, 1e-6);
@@ -253,7 +253,7 @@ static void pushed_ahead(void **state)
     w->bodies.vel[bt_world_towed(w)].x = w->bodies.vel_start[bt_world_towed(w)].x = 0;
     bt_impact hit[10];
     assert_int_equal(run(w, 40, hit), 0);
-    CHECK_CLOSE(largest_push, sheet * speed / 5, 1e-6);
+    CHECK_CLOSE(largest_quasi_static_load, sheet * speed / 5, 1e-6);
     bt_world_free(w);
 }
 
@@ -397,7 +397,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(central_impact),        cmocka_unit_test(eccentric_impact),
-        cmocka_unit_test(drag_is_push),          cmocka_unit_test(static_push),
+        cmocka_unit_test(drag_is_quasi_static),          cmocka_unit_test(static_load),
         cmocka_unit_test(hit_beside_the_middle), cmocka_unit_test(body_against_a_wall),
         cmocka_unit_test(pushed_ahead),          cmocka_unit_test(events_in_their_order),
         cmocka_unit_test(corner_in_contact),     cmocka_unit_test(panels_carry_the_ice_force),

@@ -79,7 +79,7 @@ static const struct scenario {
      "ice: {concentration: 0.8, size: 0.8, friction: 0.35}\n"
      "body: {length: 2, x: 2}\n"
      "tow: {mode: line, speed: 0.3, ramp: 1, line_length: 4}\n"
-     "solver: {tile: 2.5}\n",
+     "solver: {cell_size: 2.5}\n",
      40, 50, LINE_PULLS | RESTS},
     {"set speed, panels, crushed corners, restitution",
      "run: {dt: 0.1, duration: 12}\n"
@@ -88,7 +88,7 @@ static const struct scenario {
      "body: {length: 2, x: 2, restitution: 0.2}\n"
      "tow: {mode: speed, speed: 0.6, ramp: 1}\n"
      "impact: {conversion: crushing, corner: real}\n"
-     "solver: {tile: 2.5}\n",
+     "solver: {cell_size: 2.5}\n",
      5, 60, COLLIDES | RESTS},
     {"vessel, bridle that breaks, way-points, tide, wind from a table",
      "run: {dt: 0.2, duration: 28}\n"
@@ -101,7 +101,7 @@ static const struct scenario {
      "      vessel: {mass: 800, bollard_pull: 600, free_speed: 3, lookahead: 3}}\n"
      "water: {latitude: 75, tilt: dynamic, tide: {major: 0.05, minor: 0.02, period: 60}}\n"
      "air: {wind_table: wind.csv}\n"
-     "solver: {tile: 3}\n",
+     "solver: {cell_size: 3}\n",
      0, 90, LINE_PULLS | BREAKS | WAYPOINT | RELABELS},
     {"moving window on a line",
      "run: {dt: 0.125, duration: 40}\n"
@@ -112,7 +112,7 @@ static const struct scenario {
      "180}\n"
      "water: {latitude: 75, current_x: 0.1}\n"
      "air: {wind_x: 5, wind_y: 3}\n"
-     "solver: {tile: 2.5, max_sweeps: 40}\n",
+     "solver: {cell_size: 2.5, max_sweeps: 40}\n",
      60, 70, RENEWS | WRAPS | RELABELS},
     {"crushing in a jam behind a managed lead",
      "run: {dt: 0.1, duration: 12}\n"
@@ -121,7 +121,7 @@ static const struct scenario {
      "body: {length: 2, x: 2}\n"
      "tow: {mode: line, speed: 0.5, ramp: 0.5, line_length: 3}\n"
      "lead: {mode: managed, width: 2.4, length: 4, floe_size: 0.4}\n"
-     "solver: {tile: 2.5, max_sweeps: 60}\n",
+     "solver: {cell_size: 2.5, max_sweeps: 60}\n",
      10, 50, CRUSHES | LINE_PULLS},
     {"rafting and crushing in a moving window",
      "run: {dt: 0.1, duration: 20}\n"
@@ -130,7 +130,7 @@ static const struct scenario {
      "lognormal, crushing: {pressure: 100 Pa}, rafting: {kappa: 6}}\n"
      "body: {length: 2}\n"
      "tow: {mode: line, speed: 0.8, ramp: 1, line_length: 2}\n"
-     "solver: {tile: 2.5, max_sweeps: 60}\n",
+     "solver: {cell_size: 2.5, max_sweeps: 60}\n",
      90, 60, RAFTS | CRUSHES | RENEWS},
     {"walls that close on a periodic pack, rebounding",
      "run: {dt: 0.1, duration: 10}\n"
@@ -139,7 +139,7 @@ static const struct scenario {
      "body: {shape: none}\n"
      "water: {current_x: 0.4}\n"
      "guard: {overlap: 0}\n" // by the end there is no room left
-     "solver: {tile: 2.5, max_sweeps: 60}\n",
+     "solver: {cell_size: 2.5, max_sweeps: 60}\n",
      0, 60, WRAPS | RELABELS},
     {"floes in parts, floes by hand, a pier",
      "run: {dt: 0.2, duration: 20}\n"
@@ -149,7 +149,7 @@ static const struct scenario {
      "4.2, thickness: 0.3, fixed: true}]\n"
      "body: {length: 2, x: 2}\n"
      "tow: {mode: speed, speed: 0.8, ramp: 1}\n"
-     "solver: {tile: 2.5}\n",
+     "solver: {cell_size: 2.5}\n",
      0, 70, PARTS},
 };
 enum { N_SCENARIOS = sizeof scenarios / sizeof *scenarios };
@@ -442,7 +442,7 @@ static void damage_is_refused(void **state)
     assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
     assert_non_null(
         strstr(err.text[0],
-               "has the format \"checkpoint 1\", this program reads \"checkpoint 4\"; use the program that wrote it"));
+               "has the format \"checkpoint 1\", this program reads \"checkpoint 5\"; use the program that wrote it"));
     bt_errors_free(&err);
     // Two files, the front of one on the back of the other.
     bt_world_step(w);

@@ -256,7 +256,7 @@ static void test_weights(void **state)
         for (int v = 0; v < t.g.n; v++) count[part[v]]++;
         for (int p = 0; p < 16; p++)
             if (count[p] < 60 || count[p] > 66)
-                fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
+                fail_msg("weight %ld: part %d has %d cells", (long)weight[i], p, count[p]);
         if (weight[i]) { // METIS itself, which bisection would stand in for
             assert_true(bt_cut_by_metis(&t.g, 16, 0.03, part));
             assert_true(bt_cut_measure(&t.g, 16, part, NULL).imbalance <= 0.04);

@@ -257,7 +257,7 @@ static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **
         {&w->tow->branch[1].lambda, "tow/impulse_2"},
         {&w->tow->vessel.vy, "tow/vessel_vy"},
         {&w->window->rear, "window/rear_in_ice"},
-        {&w->undisturbed->vel.y, "window/vel"},
+        {&w->undisturbed->vel.y, "undisturbed/vel"},
         {&w->window->brought[2], "window/brought"},
         {&w->drift_y, "world/drift_y"},
         {&w->par.air_u, "step/air_u"},

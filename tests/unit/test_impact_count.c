@@ -117,9 +117,9 @@ static void collisions_by_their_time(void **state)
     assert_int_equal(c.n, 4);
     assert_true(c.hours == 6 * 0.1 / 3600 && c.start == 0.1 * 4);
     assert_true(c.largest.peak == 80 && c.largest.gid == 3 && c.start_peak == 900);
-    assert_true(c.largest_push == 7 && c.start_push == 30);
+    assert_true(c.largest_quasi_static_load == 7 && c.start_quasi_static_load == 30);
     assert_float_equal(c.collision_resistance, 3.5, 1e-12);
-    assert_float_equal(c.push_resistance, 10, 1e-12);
+    assert_float_equal(c.quasi_static_resistance, 10, 1e-12);
     double peaks[4];
     assert_int_equal(c.n_peaks, 4);
     bt_impact_count_peaks(&c, peaks);
@@ -135,8 +135,8 @@ static void collisions_by_their_time(void **state)
     bt_impact_count_init(&c, &m, &h, &w);
     bt_impact_count_add(&c, &(bt_impact){.time = 5, .peak = 3});
     assert_true(c.n_all == 1 && c.n == 0 && c.start_peak == 3 && c.hours == 0 && isnan(c.start) &&
-                isnan(c.largest_push) && c.start_push == 30);
-    assert_true(isnan(c.collision_resistance) && isnan(c.push_resistance));
+                isnan(c.largest_quasi_static_load) && c.start_quasi_static_load == 30);
+    assert_true(isnan(c.collision_resistance) && isnan(c.quasi_static_resistance));
     bt_impact_count_free(&c);
 }
 

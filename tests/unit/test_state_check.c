@@ -55,14 +55,14 @@ static const char *const cases[] = {
     "body: {length: 2, x: 2}\n"
     "tow: {mode: line, speed: 0.5, ramp: 0, line_length: 2, waypoints: [[6, 0], [9, 1]]}\n"
     "lead: {mode: managed, width: 2.4, length: 4, floe_size: 0.4}\n"
-    "solver: {tile: 2.5, max_sweeps: 60}\n",
+    "solver: {cell_size: 2.5, max_sweeps: 60}\n",
     "run: {dt: 0.125, duration: 10}\n"
     "domain: {frame: geographic, length: 26, width: 10, ends: moving, sides: periodic, ahead: 14}\n"
     "ice: {concentration: 0.35, size: 1, thickness: 0.04}\n"
     "body: {length: 2, draft: 0.5}\n"
     "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3, line_stiffness: 10 kN, line_damping: 100}\n"
     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\n"
-    "solver: {tile: 2.5, max_sweeps: 40}\n",
+    "solver: {cell_size: 2.5, max_sweeps: 40}\n",
 };
 
 enum { LAST = -1 };
@@ -92,23 +92,23 @@ static const struct change {
     {0, "field/split", 0, -1, "field/read"},
     {0, "world/step", 0, -1, NULL},
     {0, "step/water_u", 0, NAN, NULL},
-    {0, "tiles/side_x", 0, 0, NULL},
-    {0, "tiles/x0", 0, INFINITY, NULL},
-    {0, "tiles/low_x", 0, -2e9, NULL},
-    {0, "tiles/n_x", 0, 0, NULL},
-    {0, "tiles/n_y", 0, 2147483647, "tiles/n_x"},
-    {0, "tiles/n_y", 0, 1, "bodies/tile"},
-    {0, "tiles/wrap_x", 0, 3, NULL},
-    {0, "tiles/reach", 0, 0.01, NULL},
-    {0, "tiles/allowance", 0, 1e9, NULL},
-    {0, "tiles/margin_max", 0, NAN, NULL},
-    {0, "tiles/relabel", 0, 2, NULL},
-    {0, "bodies/tile", 4, 1000, NULL},
+    {0, "cells/side_x", 0, 0, NULL},
+    {0, "cells/x0", 0, INFINITY, NULL},
+    {0, "cells/low_x", 0, -2e9, NULL},
+    {0, "cells/n_x", 0, 0, NULL},
+    {0, "cells/n_y", 0, 2147483647, "cells/n_x"},
+    {0, "cells/n_y", 0, 1, "bodies/cell"},
+    {0, "cells/wrap_x", 0, 3, NULL},
+    {0, "cells/reach", 0, 0.01, NULL},
+    {0, "cells/allowance", 0, 1e9, NULL},
+    {0, "cells/margin_max", 0, NAN, NULL},
+    {0, "cells/relabel", 0, 2, NULL},
+    {0, "bodies/cell", 4, 1000, NULL},
     {0, "bodies/pose", 3, NAN, NULL},
-    {0, "bodies/pose", 0, 1e300, "bodies/tile"},
+    {0, "bodies/pose", 0, 1e300, "bodies/cell"},
     {0, "bodies/velocity", 1, INFINITY, NULL},
     {0, "bodies/path", 2, -1, NULL},
-    {0, "bodies/stirred", 0, 7, NULL},
+    {0, "bodies/disturbed", 0, 7, NULL},
     {0, "contacts/a", 0, -1, NULL},
     {0, "contacts/b", 0, 1e15, "contacts/a"},
     {0, "contacts/part", 0, 9, NULL},
@@ -120,14 +120,14 @@ static const struct change {
     {0, "tow/mark", 0, 100, NULL},
     {0, "tow/ux", 0, NAN, "tow/carriage_x"},
     {0, "tow/taut_1", 0, 3, NULL},
-    {1, "tiles/wrap_x", 0, 1e9, "tiles/side_x"},
-    {1, "tiles/wrap_y", 0, 5, NULL},
-    {1, "tiles/low_y", 0, 1, NULL},
-    {1, "tiles/n_x", 0, 1, NULL},
+    {1, "cells/wrap_x", 0, 1e9, "cells/side_x"},
+    {1, "cells/wrap_y", 0, 5, NULL},
+    {1, "cells/low_y", 0, 1, NULL},
+    {1, "cells/n_x", 0, 1, NULL},
     {1, "bodies/lap", 2, 2147483647, NULL},
     {1, "bodies/copy", 2, -2147483648.0, NULL},
     {1, "window/rear_in_ice", 0, NAN, NULL},
-    {1, "window/drift_x", 0, 1e300, NULL},
+    {1, "undisturbed/drift_x", 0, 1e300, NULL},
     {1, "window/renewed", 0, -1, NULL},
 };
 enum { N_CASES = sizeof cases / sizeof *cases, N_CHANGES = sizeof changes / sizeof *changes };

@@ -26,7 +26,7 @@ static void values_follow_from_the_conversions(void **state)
             -2.5, "wording");
     bt_warn(&list, BT_WARN_GRID_PLANE, "%s %g %g %.0f", "EPSG:\"1\"", 1.5, (double)NAN, DBL_MAX);
     bt_warn(&list, BT_WARN_TURN_JUMP, "%d", 7);
-    bt_warn(&list, BT_WARN_TURN_ROWS, "no value");
+    bt_warn(&list, BT_WARN_NOT_FINITE, "no value");
     bt_errors_add(&list, "none of the table");
     char *json = json_of(&list);
     static const char wanted[] =
@@ -36,7 +36,7 @@ static void values_follow_from_the_conversions(void **state)
     assert_int_equal(strncmp(json, wanted, sizeof wanted - 1), 0);
     assert_non_null(strstr(json, "{\"crs\": \"EPSG:\\\"1\\\"\", \"along\": 1.5, \"across\": null, \"area_percent\": "));
     assert_non_null(strstr(json, "\"text\": \"7\", \"values\": {\"waypoint\": 7}},\n"));
-    assert_non_null(strstr(json, "{\"code\": \"turn_rows\", \"text\": \"no value\", \"values\": {}},\n"));
+    assert_non_null(strstr(json, "{\"code\": \"not_finite\", \"text\": \"no value\", \"values\": {}},\n"));
     assert_non_null(strstr(json, "{\"code\": null, \"text\": \"none of the table\", \"values\": {}}\n  ]\n}\n"));
     free(json);
     bt_errors_free(&list);
