@@ -128,7 +128,8 @@ static void assert_sound(bt_world *w, int held_up)
     elsewhere.sent = elsewhere.received = elsewhere.wrong = 0;
     for (int p = 0; p < BT_PHASES; p++) elsewhere.at_work[p] = 0;
     log_of_pass *of_bodies = &log;
-    bt_phases_run(w, &(bt_before){see_to_bodies, &of_bodies}, visit, &(visitor){&log, held_up}, w->exchange ? w->bodies.vel : NULL, &t);
+    bt_phases_run(w, &(bt_before){see_to_bodies, &of_bodies}, visit, &(visitor){&log, held_up},
+                  w->exchange ? w->bodies.vel : NULL, &t);
     assert_int_equal(elsewhere.sent, w->exchange ? BT_PHASES : 0);
     assert_int_equal(elsewhere.received, elsewhere.sent);
     assert_int_equal(elsewhere.wrong, 0);
