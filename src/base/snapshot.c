@@ -59,13 +59,25 @@ void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value)
     bt_snapshot_add(s, name, BT_ITEM_F64, 1, 1, &value);
 }
 
+void bt_snapshot_begin_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n)
+{
+    char name[128];
+    snprintf(name, sizeof name, "%s/%s", group, row->name);
+    bt_snapshot_begin(s, name, row->type, n, row->width);
+    bt_item *i = &s->item[s->n - 1];
+    i->units = row->units, i->meaning = row->meaning, i->axes = row->axes;
+}
+
+void bt_snapshot_add_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, const void *data)
+{
+    bt_snapshot_begin_row(s, group, row, n);
+    bt_snapshot_put(s, n, data);
+}
+
 void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base)
 {
-    for (int k = 0; k < n_rows; k++) {
-        char name[128];
-        snprintf(name, sizeof name, "%s/%s", group, row[k].name);
-        bt_snapshot_add(s, name, row[k].type, 1, row[k].width, (const char *)base + row[k].offset);
-    }
+    for (int k = 0; k < n_rows; k++)
+        bt_snapshot_add_row(s, group, &row[k], 1, (const char *)base + row[k].offset);
 }
 
 void bt_snapshot_free(bt_snapshot *s)
@@ -160,13 +172,48 @@ double bt_snapshot_real(bt_snapshot *s, const char *name)
     return x;
 }
 
+static bool sound(bt_row_check check, double x)
+{
+    switch (check) {
+    case BT_ROW_FINITE: return isfinite(x);
+    case BT_ROW_NOT_NEGATIVE: return isfinite(x) && x >= 0;
+    case BT_ROW_SHARE: return x >= 0 && x <= 1;
+    case BT_ROW_COUNT: return x >= 0 && x <= 1e15; // more than any run can count, and far from overflow
+    case BT_ROW_FAR: return fabs(x) <= 1e9;        // cells, periods: as labels of cells are limited (cells.c)
+    case BT_ROW_YES_OR_NO: return x == 0 || x == 1;
+    default: return true;
+    }
+}
+
+static double number_of(const bt_item *i, int64_t at)
+{
+    switch (i->type) {
+    case BT_ITEM_F64: return ((const double *)i->data)[at];
+    case BT_ITEM_I64: return (double)((const int64_t *)i->data)[at];
+    case BT_ITEM_I32: return ((const int32_t *)i->data)[at];
+    case BT_ITEM_U32: return ((const uint32_t *)i->data)[at];
+    case BT_ITEM_U16: return ((const uint16_t *)i->data)[at];
+    default: return ((const uint8_t *)i->data)[at];
+    }
+}
+
+void bt_snapshot_take_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, void *to)
+{
+    static const char *const what[BT_ROW_CHECKS] = {
+        [BT_ROW_FINITE] = "is not finite", [BT_ROW_NOT_NEGATIVE] = "is negative or not finite",
+        [BT_ROW_SHARE] = "is no share",    [BT_ROW_COUNT] = "is no count",
+        [BT_ROW_FAR] = "is out of range",  [BT_ROW_YES_OR_NO] = "is neither 0 nor 1"};
+    char name[128];
+    snprintf(name, sizeof name, "%s/%s", group, row->name);
+    bt_snapshot_take(s, name, row->type, n, row->width, to);
+    const bt_item *i = bt_snapshot_find(s, name);
+    for (int64_t k = 0; row->check && k < n * row->width && !s->faulty; k++)
+        bt_snapshot_want(s, sound(row->check, number_of(i, k)), name, n > 1 ? k / row->width : -1, what[row->check]);
+}
+
 void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base)
 {
-    for (int k = 0; k < n_rows; k++) {
-        char name[128];
-        snprintf(name, sizeof name, "%s/%s", group, row[k].name);
-        bt_snapshot_take(s, name, row[k].type, 1, row[k].width, (char *)base + row[k].offset);
-    }
+    for (int k = 0; k < n_rows; k++) bt_snapshot_take_row(s, group, &row[k], 1, (char *)base + row[k].offset);
 }
 
 void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n)

@@ -30,6 +30,7 @@ typedef struct bt_item {
     int64_t n;   ///< rows; of a text its bytes with the 0 at the end
     int width;   ///< numbers a row
     void *data;  ///< [n][width]; NULL where it has gone to the file
+    const char *units, *meaning, *axes; ///< of its row (bt_state_row); NULL without one
 } bt_item;
 
 typedef struct bt_snapshot {
@@ -50,12 +51,26 @@ typedef struct bt_snapshot_sink {
     void (*drop)(bt_snapshot *s); ///< the set is given up: nothing of it stays
 } bt_snapshot_sink;
 
-/// A member of a struct that is saved.
+/// What each number of a member must be by itself: COUNT from 0 to 1e15, SHARE from 0 to 1, FAR within 1e9 of 0.
+typedef enum {
+    BT_ROW_ANY,
+    BT_ROW_FINITE,
+    BT_ROW_NOT_NEGATIVE,
+    BT_ROW_SHARE,
+    BT_ROW_COUNT,
+    BT_ROW_FAR,
+    BT_ROW_YES_OR_NO,
+    BT_ROW_CHECKS
+} bt_row_check;
+
+/// A member of a struct that is saved, or a column of an array of structs: all that is known of it.
 typedef struct bt_state_row {
-    const char *name;
+    const char *name; ///< in its group
     bt_item_type type;
     int width;
     size_t offset;
+    const char *units, *meaning, *axes; ///< for a reader of the file; axes as in h5axes.h
+    bt_row_check check;                 ///< held when it is taken
 } bt_state_row;
 
 size_t bt_item_size(bt_item_type type); ///< bytes of one number
@@ -72,6 +87,9 @@ void bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_
 void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text);
 void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value);
 void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value);
+/// The same by a row: [n][width], group/name.
+void bt_snapshot_begin_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n);
+void bt_snapshot_add_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, const void *data);
 /// Add the members of a struct, group/name each.
 void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base);
 
@@ -88,6 +106,8 @@ const char *bt_snapshot_text(bt_snapshot *s, const char *name); ///< "" and a co
 int64_t bt_snapshot_int(bt_snapshot *s, const char *name);
 double bt_snapshot_real(bt_snapshot *s, const char *name);
 void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base);
+/// [n][width], as bt_snapshot_take; complains of a number that its check does not hold for.
+void bt_snapshot_take_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, void *to);
 /// In new memory, [rows][width]: as bt_snapshot_take.
 void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n);
 
@@ -99,7 +119,8 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// What an array is, its units (NULL: it is text) and its axes, as in h5axes.h; NULL where that is not known.
+/// What an array without a row is, its units (NULL: it is text) and its axes, as in h5axes.h; NULL where that is not
+/// known.
 typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 
 /// An HDF5 file, which what is added to s from here on goes to, with what each array is unless meaning is NULL. s is

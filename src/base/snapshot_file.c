@@ -46,6 +46,14 @@ struct bt_snapshot_file {
     bt_status status; ///< of the whole, then
 };
 
+/// By its row, or by what the file was begun with.
+static const char *meaning_of(const struct bt_snapshot_file *f, const bt_item *i, const char **units, const char **axes)
+{
+    if (!i->meaning) return f->meaning ? f->meaning(i->name, units, axes) : NULL;
+    *units = i->units, *axes = i->axes;
+    return i->meaning;
+}
+
 /// Some rows, or all at once, which takes HDF5 a third of the calls.
 static void put_rows(bt_snapshot *s, int64_t n, const void *rows)
 {
@@ -73,7 +81,7 @@ static void end_array(bt_snapshot *s, int n)
     const bt_item *i = &s->item[n - 1];
     if (f->dataset >= 0) bt_h5_check(&f->h, H5Dclose(f->dataset) >= 0); // small data go to the file only now
     f->dataset = -1;
-    const char *units, *axes, *text = f->meaning ? f->meaning(i->name, &units, &axes) : NULL;
+    const char *units, *axes, *text = meaning_of(f, i, &units, &axes);
     if (!text) return;
     char name[160];
     snprintf(name, sizeof name, "/%s", i->name);
@@ -95,10 +103,10 @@ void bt_snapshot_end(bt_snapshot *s, bt_errors *err)
     f->h.err = err;
     end_array(s, s->n);
     // The axes last: a coordinate such as /history/time may follow what it belongs to.
-    for (int k = 0; f->meaning && k < s->n; k++) {
+    for (int k = 0; k < s->n; k++) {
         char name[160];
         const char *units, *axes;
-        if (s->item[k].type == BT_ITEM_TEXT || !f->meaning(s->item[k].name, &units, &axes)) continue;
+        if (s->item[k].type == BT_ITEM_TEXT || !meaning_of(f, &s->item[k], &units, &axes)) continue;
         snprintf(name, sizeof name, "/%s", s->item[k].name);
         bt_h5_axes(&f->h, name, axes);
     }

@@ -198,7 +198,8 @@ static bt_row_state row_state(const bt_world *w, const bt_cell *t, bt_idx j, con
     return BT_ROW_OPEN;
 }
 
-__attribute__((flatten)) void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
+__attribute__((flatten))
+void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
 {
     bt_cell *t = &w->cells->cell[k];
     hold(t, s);

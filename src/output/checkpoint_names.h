@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What each array of a checkpoint is, for readers of the file.
+// What those arrays of a checkpoint are that no row of a saved member describes, for readers of the file.
 #ifndef BT_CHECKPOINT_NAMES_H
 #define BT_CHECKPOINT_NAMES_H
 

@@ -7,40 +7,44 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define COLUMN(column, name, member) [column] = {"history/" name, offsetof(bt_sample, member)}
+#define COLUMN(column, name, member, units, meaning) \
+    [column] = {name, BT_ITEM_F64, 1, offsetof(bt_sample, member), units, meaning, "time", BT_ROW_ANY}
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 
-typedef struct {
-    const char *name;   ///< in the checkpoint, under history/
-    size_t offset;      ///< of the number in bt_sample
-} column_def;
-
-static const column_def columns[BT_N_COLUMNS] = {
-    COLUMN(BT_COL_TIME, "time", time),
-    COLUMN(BT_COL_ICE, "ice", ice_resistance),
-    COLUMN(BT_COL_TOW, "tow", tow_force),
-    COLUMN(BT_COL_DRAG, "drag", drag_force),
-    COLUMN(BT_COL_CORIOLIS, "coriolis", coriolis_force),
-    COLUMN(BT_COL_TILT, "tilt", tilt_force),
-    COLUMN(BT_COL_INERTIA, "inertia", inertia_force),
-    COLUMN(BT_COL_BUDGET, "budget", ice_resistance_budget),
-    COLUMN(BT_COL_TENSION_1, "tension_1", line_tension_1),
-    COLUMN(BT_COL_TENSION_2, "tension_2", line_tension_2),
-    COLUMN(BT_COL_THRUST, "thrust", vessel_thrust),
-    COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged),
-    COLUMN(BT_COL_RESIDUAL, "residual", residual),
-    COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
-    COLUMN(BT_COL_QUASI_STATIC, "quasi_static", largest_quasi_static_load),
-    COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice),
-    COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice),
-    COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water),
-    COLUMN(BT_COL_LEEWAY_WATER, "leeway_through_water", leeway_through_water),
-    COLUMN(BT_COL_IN_ICE_X, "body_in_ice_x", body_in_ice_x),
-    COLUMN(BT_COL_IN_ICE_Y, "body_in_ice_y", body_in_ice_y),
-    COLUMN(BT_COL_VX, "body_vx", body_vx),
-    COLUMN(BT_COL_VY, "body_vy", body_vy),
-    COLUMN(BT_COL_YAW, "body_yaw", body_yaw),
-    COLUMN(BT_COL_NO_LOAD, "no_load", no_load),
+/// Places are those in bt_sample.
+static const bt_state_row columns[BT_N_COLUMNS] = {
+    COLUMN(BT_COL_TIME, "time", time, "s", "end of each step"),
+    COLUMN(BT_COL_ICE, "ice", ice_resistance, "N", "ice resistance of each step"),
+    COLUMN(BT_COL_TOW, "tow", tow_force, "N", "tow force of each step"),
+    COLUMN(BT_COL_DRAG, "drag", drag_force, "N", "drag of each step"),
+    COLUMN(BT_COL_CORIOLIS, "coriolis", coriolis_force, "N", "Coriolis force of each step"),
+    COLUMN(BT_COL_TILT, "tilt", tilt_force, "N", "force by the tilt of the sea surface of each step"),
+    COLUMN(BT_COL_INERTIA, "inertia", inertia_force, "N", "inertia of the body in each step"),
+    COLUMN(BT_COL_BUDGET, "budget", ice_resistance_budget, "N", "ice resistance by momentum of each step"),
+    COLUMN(BT_COL_TENSION_1, "tension_1", line_tension_1, "N", "tension of the first branch in each step"),
+    COLUMN(BT_COL_TENSION_2, "tension_2", line_tension_2, "N", "tension of the second branch in each step"),
+    COLUMN(BT_COL_THRUST, "thrust", vessel_thrust, "N", "thrust of the vessel in each step"),
+    COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged, "1", "1 = the step did not converge"),
+    COLUMN(BT_COL_RESIDUAL, "residual", residual, "m/s", "residual of each step"),
+    COLUMN(BT_COL_COLLISION, "collision", collision_resistance, "N",
+        "part of the resistance of each step that collisions have"),
+    COLUMN(BT_COL_QUASI_STATIC, "quasi_static", largest_quasi_static_load, "N",
+        "largest force of a floe on the body that is no collision, of each step"),
+    COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice, "m/s",
+        "speed of the body through undisturbed ice, of each step"),
+    COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice, "m/s",
+        "the same across the tow, from +x towards +y"),
+    COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water, "m/s",
+        "speed of the body through the water, along the tow, in each step"),
+    COLUMN(BT_COL_LEEWAY_WATER, "leeway_through_water", leeway_through_water, "m/s",
+        "the same across the tow, from +x towards +y"),
+    COLUMN(BT_COL_IN_ICE_X, "body_in_ice_x", body_in_ice_x, "m",
+        "place of the body in a frame that drifts with undisturbed ice, x, after each step"),
+    COLUMN(BT_COL_IN_ICE_Y, "body_in_ice_y", body_in_ice_y, "m", "the same, y"),
+    COLUMN(BT_COL_VX, "body_vx", body_vx, "m/s", "velocity of the body over ground, x, in each step"),
+    COLUMN(BT_COL_VY, "body_vy", body_vy, "m/s", "the same, y"),
+    COLUMN(BT_COL_YAW, "body_yaw", body_yaw, "rad", "yaw of the towed body"),
+    COLUMN(BT_COL_NO_LOAD, "no_load", no_load, "1", "1 = the load of the body had no bound in the step"),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)
@@ -51,31 +55,32 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-#define TOTAL(type, member, rule_, from)                                                                               \
+#define TOTAL(type, member, rule_, from, units, meaning)                                                               \
     {                                                                                                                  \
-        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
-        .offset = offsetof(bt_sample, from)                                                                            \
+        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member), units, meaning, "one", BT_ROW_ANY},           \
+        .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)                                                  \
     }
 static const bt_total totals[] = {
-    TOTAL(F64, sum_contacts, SUM, contacts),
-    TOTAL(F64, sum_sweeps, SUM, sweeps),
-    TOTAL(F64, sum_updates, SUM, contact_updates),
-    TOTAL(F64, sum_moves, SUM, momentum_moves),
-    TOTAL(F64, sum_checks, SUM, residual_checks),
-    TOTAL(F64, sum_projected, SUM, position_updates),
-    TOTAL(F64, contact_work, SUM, contact_work),
-    TOTAL(F64, max_overlap, MAX, overlap),
-    TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
-    TOTAL(F64, max_residual, MAX, residual),
-    TOTAL(I64, unconverged, STEPS, unconverged),
-    TOTAL(F64, locked_steps, STEPS, locked),
-    TOTAL(F64, no_load_steps, STEPS, no_load),
-    TOTAL(I64, unprojected, STEPS, unprojected),
-    TOTAL(I64, positive_work, STEPS, added_energy),
-    TOTAL(I64, restitution_cut, STEPS, restitution_cut),
-    TOTAL(I64, repeats, SUM, repeats),
-    TOTAL(I64, outrun, STEPS, outrun),
-    TOTAL(I64, misjudged, SUM, misjudged),
+    TOTAL(F64, sum_contacts, SUM, contacts, "1", "contact points, sum over the steps"),
+    TOTAL(F64, sum_sweeps, SUM, sweeps, "1", "sweeps, sum over the steps"),
+    TOTAL(F64, sum_updates, SUM, contact_updates, "1", "updates of contacts, sum over the steps"),
+    TOTAL(F64, sum_moves, SUM, momentum_moves, "1", "momentum moves, sum over the steps"),
+    TOTAL(F64, sum_checks, SUM, residual_checks, "1", "residuals of contacts that were taken, sum over the steps"),
+    TOTAL(F64, sum_projected, SUM, position_updates, "1",
+        "updates of contacts by the position projection, sum over the steps"),
+    TOTAL(F64, contact_work, SUM, contact_work, "J", "work of the contact impulses so far"),
+    TOTAL(F64, max_overlap, MAX, overlap, "m", "largest overlap so far"),
+    TOTAL(F64, max_momentum_residual, MAX, momentum_residual, "1", "largest residual of the momentum balance so far"),
+    TOTAL(F64, max_residual, MAX, residual, "m/s", "largest residual of the solver so far"),
+    TOTAL(I64, unconverged, STEPS, unconverged, "1", "steps that did not converge"),
+    TOTAL(F64, locked_steps, STEPS, locked, "1", "of them, steps in which some bodies could not give way"),
+    TOTAL(F64, no_load_steps, STEPS, no_load, "1", "of these, steps in which the load of the towed body had no bound"),
+    TOTAL(I64, unprojected, STEPS, unprojected, "1", "steps whose overlap was not removed"),
+    TOTAL(I64, positive_work, STEPS, added_energy, "1", "steps in which contacts added energy"),
+    TOTAL(I64, restitution_cut, STEPS, restitution_cut, "1", "steps in which rebounds were lowered"),
+    TOTAL(I64, repeats, SUM, repeats, "1", "solutions that were repeated"),
+    TOTAL(I64, outrun, STEPS, outrun, "1", "steps whose last solution outran the search for pairs"),
+    TOTAL(I64, misjudged, SUM, misjudged, "1", "loads of pairs that pass, and pairs that meet without one"),
 };
 
 enum { N_TOTALS = sizeof totals / sizeof *totals };
@@ -92,7 +97,8 @@ static const bt_total *total_of_law(int k)
             const int number = bt_law_first_number(law) + t->number;
             made[i] = (bt_total){
                 .at = {t->name, t->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
-                       offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value)},
+                       offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value), t->units, t->description,
+                       "one", BT_ROW_ANY},
                 .rule = t->rule,
                 .offset = offsetof(bt_sample, laws) + (size_t)number * sizeof(double)};
         }
@@ -122,10 +128,12 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
 
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
 {
-    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", columns[k].name);
+    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "history/%s", columns[k].name);
     else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", bt_added(k - BT_N_COLUMNS)->name);
     return name;
 }
+
+const bt_state_row *bt_history_column(int k) { return &columns[k]; }
 
 void bt_history_init(bt_history *h) { *h = (bt_history){.n_columns = BT_N_COLUMNS + bt_n_added()}; }
 

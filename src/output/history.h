@@ -67,6 +67,8 @@ const bt_total *bt_history_total(int k);
 /// Name of a column in the checkpoint; returns name.
 #define BT_HISTORY_ADDED "history/added_"
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME]);
+/// The column of the program's own, k < BT_N_COLUMNS, as it is in a checkpoint.
+const bt_state_row *bt_history_column(int k);
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.
 static inline double bt_max_seen(double a, double b) { return a >= b || a != a ? a : b; }

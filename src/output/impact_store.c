@@ -236,11 +236,12 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
 }
 
 static const bt_state_row state_rows[] = {
-#define STATE(member) {#member, BT_ITEM_I64, 1, offsetof(bt_impact_store, member)}
-    STATE(written),
-    STATE(n_merged),
-    STATE(samples_written),
-    {"panel_steps", BT_ITEM_I64, 1, offsetof(bt_impact_store, blocks.steps)},
+#define STATE(label, member, meaning) \
+    {label, BT_ITEM_I64, 1, offsetof(bt_impact_store, member), "1", meaning, "one", BT_ROW_COUNT}
+    STATE("written", written, "collisions in result.h5"),
+    STATE("n_merged", n_merged, "steps merged into the sample of panel loads under way"),
+    STATE("samples_written", samples_written, "samples of panel loads in result.h5"),
+    STATE("panel_steps", blocks.steps, "steps of which panel loads are kept"),
 #undef STATE
 };
 enum { N_STATE = sizeof state_rows / sizeof *state_rows, LOADS_WIDTH = sizeof(bt_panel_loads) / sizeof(double) };

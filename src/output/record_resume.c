@@ -33,7 +33,9 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_history *h = &r->history;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
-    for (int k = 0; k < h->n_columns; k++)
+    for (int k = 0; k < BT_N_COLUMNS; k++)
+        bt_snapshot_add_row(s, "history", bt_history_column(k), h->n, h->column[k]);
+    for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
         bt_snapshot_add(s, bt_history_name(k, name), BT_ITEM_F64, h->n, 1, h->column[k]);
     bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
     bt_snapshot_add_int(s, "record/entries", r->written);

@@ -20,64 +20,121 @@
 #include "partition/domain.h"
 #include "output/state_check.h"
 
-#define MEMBER(struct_, label, type_, width_, member) {label, BT_ITEM_##type_, width_, offsetof(struct_, member)}
+/// A member that is saved: where it is, what it is for a reader of the file (h5axes.h), and what must be true of it by
+/// itself. What members must be to each other: state_check.c.
+#define MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
+    {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_}
+#define ONE(struct_, label, type_, member, units_, check_, meaning_) \
+    MEMBER(struct_, label, type_, 1, member, units_, "one", check_, meaning_)
 #define ADDED_LAWS "contacts/added_laws"
 #define ADDED_FORCES "forces/added_laws"
 #define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
 
 // --- the tables ------------------------------------------------------------------------------------------------------
 
-#define WORLD(type, member) MEMBER(bt_world, #member, type, 1, member)
-static const bt_state_row world_rows[] = {WORLD(I64, step), WORLD(F64, drift_x), WORLD(F64, drift_y)};
+#define WORLD(type, member, units, check, meaning) ONE(bt_world, #member, type, member, units, check, meaning)
+static const bt_state_row world_rows[] = {
+    WORLD(I64, step, "1", COUNT, "steps done"),
+    WORLD(F64, drift_x, "m", FINITE, "way that the water has gone, x"),
+    WORLD(F64, drift_y, "m", FINITE, "way that the water has gone, y"),
+};
 
-#define PAR(member) MEMBER(bt_params, #member, F64, 1, member)
+#define PAR(member, units, check, meaning) ONE(bt_params, #member, F64, member, units, check, meaning)
 /// Of the last step where they change with time; the others show that the case is the one of the checkpoint.
 static const bt_state_row par_rows[] = {
-    PAR(dt),       PAR(x0),        PAR(y0),        PAR(period_x), PAR(period_y), PAR(tolerance),
-    PAR(slop),     PAR(size),      PAR(water_u),   PAR(water_v),  PAR(air_u),    PAR(air_v),
-    PAR(coriolis), PAR(balance_u), PAR(balance_v), PAR(tilt_ax),  PAR(tilt_ay),
+    PAR(dt, "s", FINITE, "time step"),
+    PAR(x0, "m", FINITE, "low corner of the domain, x"),
+    PAR(y0, "m", FINITE, "low corner of the domain, y"),
+    PAR(period_x, "m", FINITE, "length of the domain where x is periodic, 0 = it is not"),
+    PAR(period_y, "m", FINITE, "length of the domain where y is periodic, 0 = it is not"),
+    PAR(tolerance, "m/s", FINITE, "residual at which the solver stops"),
+    PAR(slop, "m", FINITE, "overlap that is left alone"),
+    PAR(size, "m", FINITE, "mean floe diameter"),
+    PAR(water_u, "m/s", FINITE, "velocity of the water in the last step, x"),
+    PAR(water_v, "m/s", FINITE, "velocity of the water in the last step, y"),
+    PAR(air_u, "m/s", FINITE, "velocity of the air in the last step, x"),
+    PAR(air_v, "m/s", FINITE, "velocity of the air in the last step, y"),
+    PAR(coriolis, "1/s", FINITE, "Coriolis parameter with the sign of the frame"),
+    PAR(balance_u, "m/s", FINITE, "velocity in geostrophic balance with the tilt, x"),
+    PAR(balance_v, "m/s", FINITE, "velocity in geostrophic balance with the tilt, y"),
+    PAR(tilt_ax, "m/s2", FINITE, "acceleration by the tilt of the sea surface beyond that balance, x"),
+    PAR(tilt_ay, "m/s2", FINITE, "acceleration by the tilt of the sea surface beyond that balance, y"),
 };
 
-#define CELLS(type, member) MEMBER(bt_cells, #member, type, 1, member)
+#define CELLS(type, member, units, check, meaning) ONE(bt_cells, #member, type, member, units, check, meaning)
 static const bt_state_row cells_rows[] = {
-    CELLS(F64, x0),     CELLS(F64, y0),           CELLS(F64, side_x),  CELLS(F64, side_y),     CELLS(F64, allowance),
-    CELLS(F64, reach),  CELLS(F64, heaviest),     CELLS(U8, rebounds), CELLS(F64, margin_max), CELLS(I32, low_x),
-    CELLS(I32, low_y),  CELLS(I32, n_x),          CELLS(I32, n_y),     CELLS(I32, wrap_x),     CELLS(I32, wrap_y),
-    CELLS(U8, relabel), CELLS(I64, n_labellings),
+    CELLS(F64, x0, "m", FINITE, "low corner of the grid of cells, x"),
+    CELLS(F64, y0, "m", FINITE, "low corner of the grid of cells, y"),
+    CELLS(F64, side_x, "m", FINITE, "side of a cell, x"),
+    CELLS(F64, side_y, "m", FINITE, "side of a cell, y"),
+    CELLS(F64, allowance, "m", ANY, "how far a centroid may stand outside its cell"),
+    CELLS(F64, reach, "m", NOT_NEGATIVE, "largest radius of a floe"),
+    CELLS(F64, heaviest, "kg", NOT_NEGATIVE, "mass of the heaviest floe"),
+    CELLS(U8, rebounds, "1", ANY, "1 = some body has a restitution"),
+    CELLS(F64, margin_max, "m", ANY, "largest margin of the search for pairs that the cells allow"),
+    CELLS(I32, low_x, "1", ANY, "first cell, x"),
+    CELLS(I32, low_y, "1", ANY, "first cell, y"),
+    CELLS(I32, n_x, "1", ANY, "cells, x"),
+    CELLS(I32, n_y, "1", ANY, "cells, y"),
+    CELLS(I32, wrap_x, "1", ANY, "cells of a period, x; 0 = not periodic"),
+    CELLS(I32, wrap_y, "1", ANY, "cells of a period, y; 0 = not periodic"),
+    CELLS(U8, relabel, "1", ANY, "1 = the cells are to be labelled anew"),
+    CELLS(I64, n_labellings, "1", COUNT, "times that the cells were labelled"),
 };
 
-#define TOW(type, member) MEMBER(bt_tow, #member, type, 1, member)
-#define BRANCH(label, type, k, member) MEMBER(bt_tow, label, type, 1, branch[k].member)
+#define TOW(type, member, units, check, meaning) ONE(bt_tow, #member, type, member, units, check, meaning)
+#define BRANCH(label, type, k, member, units, check, meaning) \
+    ONE(bt_tow, label, type, branch[k].member, units, check, meaning)
+#define VESSEL(member, units, check, meaning) \
+    ONE(bt_tow, "vessel_" #member, F64, vessel.member, units, check, meaning)
 static const bt_state_row tow_rows[] = {
-    TOW(F64, time),
-    TOW(F64, carriage_x),
-    TOW(F64, carriage_y),
-    TOW(F64, travel_x),
-    TOW(F64, travel_y),
-    TOW(F64, way),
-    TOW(I32, mark),
-    TOW(F64, ux),
-    TOW(F64, uy),
-    BRANCH("impulse_1", F64, 0, lambda),
-    BRANCH("taut_1", U8, 0, taut),
-    BRANCH("broken_1", U8, 0, broken),
-    BRANCH("impulse_2", F64, 1, lambda),
-    BRANCH("taut_2", U8, 1, taut),
-    BRANCH("broken_2", U8, 1, broken),
-    MEMBER(bt_tow, "vessel_vx", F64, 1, vessel.vx),
-    MEMBER(bt_tow, "vessel_vy", F64, 1, vessel.vy),
-    MEMBER(bt_tow, "vessel_way", F64, 1, vessel.way),
+    TOW(F64, time, "s", ANY, "time of the tow"),
+    TOW(F64, carriage_x, "m", FINITE, "towing end of the line, x"),
+    TOW(F64, carriage_y, "m", FINITE, "towing end of the line, y"),
+    TOW(F64, travel_x, "m", FINITE, "place of the towed body, not wrapped, x"),
+    TOW(F64, travel_y, "m", FINITE, "place of the towed body, not wrapped, y"),
+    TOW(F64, way, "m", FINITE, "length of path along which the towing end, or the towed body, has been led"),
+    TOW(I32, mark, "1", ANY, "way-points passed"),
+    TOW(F64, ux, "1", FINITE, "direction of the tow, x"),
+    TOW(F64, uy, "1", FINITE, "direction of the tow, y"),
+    BRANCH("impulse_1", F64, 0, lambda, "N s", FINITE, "impulse of the first branch in the last step"),
+    BRANCH("taut_1", U8, 0, taut, "1", ANY, "1 = the first branch is taut"),
+    BRANCH("broken_1", U8, 0, broken, "1", ANY, "1 = the first branch has parted"),
+    BRANCH("impulse_2", F64, 1, lambda, "N s", FINITE, "impulse of the second branch in the last step"),
+    BRANCH("taut_2", U8, 1, taut, "1", ANY, "1 = the second branch is taut"),
+    BRANCH("broken_2", U8, 1, broken, "1", ANY, "1 = the second branch has parted"),
+    VESSEL(vx, "m/s", FINITE, "velocity of the vessel, x"),
+    VESSEL(vy, "m/s", FINITE, "velocity of the vessel, y"),
+    VESSEL(way, "m", FINITE, "way of the vessel along the path"),
 };
 
-#define WINDOW(type, width, member) MEMBER(bt_window, #member, type, width, member)
+#define WINDOW(type, width, member, units, axes, check, meaning) \
+    MEMBER(bt_window, #member, type, width, member, units, axes, check, meaning)
 static const bt_state_row window_rows[] = {
-    WINDOW(F64, 1, start),   WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),        WINDOW(I64, 1, missed),
-    WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
-    WINDOW(F64, 1, most),    WINDOW(F64, 1, overtaken),   MEMBER(bt_window, "rear_in_ice", F64, 1, rear),
+    WINDOW(F64, 1, start, "m", "one", FINITE, "place of the rear end at first, along the tow"),
+    WINDOW(I64, 1, renewed, "1", "one", COUNT, "floes renewed in all"),
+    WINDOW(I64, 1, kept, "1", "one", COUNT, "floes that went round as they were, in all"),
+    WINDOW(I64, 1, missed, "1", "one", COUNT, "places ahead that stayed empty, in all"),
+    WINDOW(I64, 1, waiting, "1", "one", COUNT, "floes that waited to be renewed when the window last moved"),
+    WINDOW(I64, 1, renewed_now, "1", "one", COUNT, "floes renewed in the last step"),
+    WINDOW(F64, 3, dropped, "kg m/s, kg m/s, J", "one momentum_energy", FINITE,
+        "momentum x, y and kinetic energy of the floes taken out, in all"),
+    WINDOW(F64, 3, brought, "kg m/s, kg m/s, J", "one momentum_energy", FINITE,
+        "momentum x, y and kinetic energy of the floes brought in, in all"),
+    WINDOW(F64, 1, most, "m", "one", FINITE, "largest way of the body through undisturbed ice, along the tow"),
+    WINDOW(F64, 1, overtaken, "m", "one", FINITE, "by how much it fell behind that, at most"),
+    ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
+        "place of the rear end now, along the tow, in a frame that drifts with undisturbed ice"),
 };
 
-#define UNDISTURBED(width, member) MEMBER(bt_undisturbed, #member, F64, width, member)
-static const bt_state_row undisturbed_rows[] = {UNDISTURBED(1, drift_x), UNDISTURBED(1, drift_y), UNDISTURBED(4, vel)};
+#define UNDISTURBED(width, member, units, axes, check, meaning) \
+    MEMBER(bt_undisturbed, #member, F64, width, member, units, axes, check, meaning)
+static const bt_state_row undisturbed_rows[] = {
+    UNDISTURBED(1, drift_x, "m", "one", FINITE, "way of the undisturbed ice, x"),
+    UNDISTURBED(1, drift_y, "m", "one", FINITE, "way of the undisturbed ice, y"),
+    UNDISTURBED(4, vel, "m/s, m/s, rad/s, 1", "one motion", FINITE,
+        "velocity of the undisturbed ice, x, y, turning; the last is unused"),
+};
 
 enum {
     IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double),
@@ -85,53 +142,64 @@ enum {
     PANEL_WIDTH = sizeof(bt_panel) / sizeof(double)
 };
 
-#define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
-static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time),   STALL(F64, asked), STALL(F64, spent),
-                                          STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun),
-                                          STALL(F64, ice),     STALL(F64, pull),   STALL(F64, inside),
-                                          STALL(F64, inside_from), STALL(U8, outside)};
-
-#define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
-static const bt_state_row lead_rows[] = {
-    LEAD(I32, mode),
-    LEAD(F64, width),
-    LEAD(F64, length),
-    LEAD(I64, taken),
-    LEAD(F64, area_taken),
-    LEAD(I64, pieces),
-    LEAD(F64, mean_piece),
-    LEAD(F64, concentration_before),
-    LEAD(F64, concentration_after),
+#define STALL(type, member, units, check, meaning) ONE(bt_stall, #member, type, member, units, check, meaning)
+static const bt_state_row stall_rows[] = {
+    STALL(I64, windows, "1", COUNT, "windows of time in which the body stood still"),
+    STALL(F64, time, "s", FINITE, "time of these"),
+    STALL(F64, asked, "m", FINITE, "way asked for in the window under way"),
+    STALL(F64, spent, "s", FINITE, "time spent in it"),
+    STALL(F64, from_x, "m", FINITE, "where the body was at its beginning, x"),
+    STALL(F64, from_y, "m", FINITE, "where the body was at its beginning, y"),
+    STALL(U8, begun, "1", ANY, "1 = such a window is under way"),
+    STALL(F64, ice, "N s", FINITE, "impulse of the ice against the tow in it"),
+    STALL(F64, pull, "N s", FINITE, "impulse of the tow in it"),
+    STALL(F64, inside, "s", ANY, "time for which the towing end was within the hull, after it had been outside"),
+    STALL(F64, inside_from, "s", ANY, "when it first was"),
+    STALL(U8, outside, "1", ANY, "1 = the towing end has been outside the hull"),
 };
 
-#define FIELD(type, label, member) MEMBER(bt_field, label, type, 1, member)
+#define LEAD(type, member, units, check, meaning) ONE(bt_lead_stats, #member, type, member, units, check, meaning)
+static const bt_state_row lead_rows[] = {
+    LEAD(I32, mode, "1", ANY, "kind of the lead ahead of the body"),
+    LEAD(F64, width, "m", ANY, "its width"),
+    LEAD(F64, length, "m", ANY, "its length"),
+    LEAD(I64, taken, "1", ANY, "floes taken out of it"),
+    LEAD(F64, area_taken, "m2", ANY, "their area"),
+    LEAD(I64, pieces, "1", ANY, "pieces that were put into it"),
+    LEAD(F64, mean_piece, "m", ANY, "their mean size"),
+    LEAD(F64, concentration_before, "1", ANY, "concentration of the ice before the lead was made"),
+    LEAD(F64, concentration_after, "1", ANY, "concentration of the ice after it"),
+};
+
+#define FIELD(type, label, member, units, check, meaning) ONE(bt_field, label, type, member, units, check, meaning)
 static const bt_state_row field_rows[] = {
-    FIELD(F64, "ice_area", ice_area),
-    FIELD(F64, "concentration", concentration),
-    FIELD(I64, "read", outlines.read),
-    FIELD(I64, "turned", outlines.turned),
-    FIELD(I64, "dropped", outlines.dropped),
-    FIELD(I64, "hulled", outlines.hulled),
-    FIELD(F64, "hull_area", outlines.hull_area),
-    FIELD(I64, "split", outlines.split),
-    FIELD(I64, "parts", outlines.parts),
-    FIELD(F64, "lon", outlines.lon),
-    FIELD(F64, "lat", outlines.lat),
-    FIELD(I64, "rounded", outlines.rounded),
-    FIELD(I64, "rounded_corners", outlines.rounded_corners),
-    FIELD(F64, "rounded_area", outlines.rounded_area),
-    FIELD(F64, "east", outlines.east),
-    FIELD(F64, "north", outlines.north),
-    FIELD(I64, "unnamed", outlines.unnamed),
-    FIELD(I64, "bare", outlines.bare),
-    FIELD(I64, "outside", outlines.outside),
-    FIELD(F64, "outside_area", outlines.outside_area),
-    FIELD(F64, "own_area", outlines.own_area),
-    FIELD(F64, "region_area", outlines.region_area),
-    FIELD(F64, "x_min", outlines.region[0]),
-    FIELD(F64, "y_min", outlines.region[1]),
-    FIELD(F64, "x_max", outlines.region[2]),
-    FIELD(F64, "y_max", outlines.region[3]),
+    FIELD(F64, "ice_area", ice_area, "m2", ANY, "area that the concentration of the field refers to"),
+    FIELD(F64, "concentration", concentration, "1", ANY, "share of the ice region that they cover"),
+    FIELD(I64, "read", outlines.read, "1", COUNT, "outlines that were read"),
+    FIELD(I64, "turned", outlines.turned, "1", COUNT, "outlines that ran clockwise"),
+    FIELD(I64, "dropped", outlines.dropped, "1", COUNT, "outlines that were dropped"),
+    FIELD(I64, "hulled", outlines.hulled, "1", COUNT, "outlines that were replaced by their hull"),
+    FIELD(F64, "hull_area", outlines.hull_area, "m2", ANY, "area that the hulls added"),
+    FIELD(I64, "split", outlines.split, "1", COUNT, "outlines that were split into convex parts"),
+    FIELD(I64, "parts", outlines.parts, "1", COUNT, "parts of these"),
+    FIELD(F64, "lon", outlines.lon, "rad", ANY, "longitude of the origin of the map"),
+    FIELD(F64, "lat", outlines.lat, "rad", ANY, "latitude of the origin of the map"),
+    FIELD(I64, "rounded", outlines.rounded, "1", COUNT, "floes not convex by rounding alone, taken for convex"),
+    FIELD(I64, "rounded_corners", outlines.rounded_corners, "1", COUNT, "corners that this left out"),
+    FIELD(F64, "rounded_area", outlines.rounded_area, "m2", ANY, "area that it added"),
+    FIELD(F64, "east", outlines.east, "m", ANY, "origin in the map, east"),
+    FIELD(F64, "north", outlines.north, "m", ANY, "origin in the map, north"),
+    FIELD(I64, "unnamed", outlines.unnamed, "1", COUNT,
+        "features without a thickness that have a property of nearly this name"),
+    FIELD(I64, "bare", outlines.bare, "1", ANY, "features without a thickness"),
+    FIELD(I64, "outside", outlines.outside, "1", ANY, "floes whose centroid is outside the ice region"),
+    FIELD(F64, "outside_area", outlines.outside_area, "m2", ANY, "area of floes outside the ice region"),
+    FIELD(F64, "own_area", outlines.own_area, "m2", ANY, "area that the concentration of a field file refers to"),
+    FIELD(F64, "region_area", outlines.region_area, "m2", ANY, "area of the case's ice region, beside it"),
+    FIELD(F64, "x_min", outlines.region[0], "m", ANY, "ice region of a field file, 0 as the other three for others"),
+    FIELD(F64, "y_min", outlines.region[1], "m", ANY, "the same, y"),
+    FIELD(F64, "x_max", outlines.region[2], "m", ANY, "its other end, x"),
+    FIELD(F64, "y_max", outlines.region[3], "m", ANY, "the same, y"),
 };
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
@@ -168,11 +236,20 @@ typedef struct {
 } body_row;
 
 /// Its columns in the file.
+#define BODY(label, type, width, member, units, axes, check, meaning) \
+    MEMBER(body_row, label, type, width, member, units, axes, check, meaning)
 static const bt_state_row body_columns[] = {
-    MEMBER(body_row, "pose", F64, 3, pose),         MEMBER(body_row, "velocity", F64, 3, vel),
-    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "cell", I32, 2, cell),
-    MEMBER(body_row, "copy", I32, 1, copy),         MEMBER(body_row, "lap", I32, 1, lap),
-    MEMBER(body_row, "disturbed", I64, 1, disturbed), MEMBER(body_row, "exposure", F64, 3, exposure),
+    BODY("pose", F64, 3, pose, "m, m, rad", "body component", FINITE, "x, y, yaw of every body, by id"),
+    BODY("velocity", F64, 3, vel, "m/s, m/s, rad/s", "body component", FINITE,
+        "velocity of every body, x, y and turning"),
+    BODY("path", F64, 1, path, "m", "body", NOT_NEGATIVE,
+        "length of path of the fastest point of the outline, through the water's frame"),
+    BODY("exposure", F64, 3, exposure, "1", "body component", SHARE,
+        "share of a floe's drag that its neighbours leave: skin, form in water, form in air"),
+    BODY("cell", I32, 2, cell, "1", "body xy", ANY, "cell of each body, x and y"),
+    BODY("copy", I32, 1, copy, "1", "body", FAR, "which repetition of the place, in lengths of the period along x"),
+    BODY("lap", I32, 1, lap, "1", "body", FAR, "periods along x that the body lies above its pose, which is wrapped"),
+    BODY("disturbed", I64, 1, disturbed, "1", "body", YES_OR_NO, "1 = disturbed since it came to rest"),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -221,9 +298,7 @@ static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *
                          size_t size, int64_t n)
 {
     for (int k = 0; k < n_columns; k++) {
-        char name[64];
-        snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
-        bt_snapshot_begin(s, name, columns[k].type, n, columns[k].width);
+        bt_snapshot_begin_row(s, group, &columns[k], n);
         char *portion = bt_alloc(PORTION * (size_t)columns[k].width, bt_item_size(columns[k].type));
         if (n == 0) bt_snapshot_put(s, 0, portion);
         for (int64_t i = 0; i < n; i += PORTION) {
@@ -244,9 +319,8 @@ static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row 
     if (*n < 0) *n = bt_snapshot_rows(s, name);
     char *rows = bt_alloc((size_t)*n, size);
     for (int k = 0; k < n_columns; k++) {
-        snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
         char *array = bt_alloc((size_t)*n * (size_t)columns[k].width, bt_item_size(columns[k].type));
-        bt_snapshot_take(s, name, columns[k].type, *n, columns[k].width, array);
+        bt_snapshot_take_row(s, group, &columns[k], *n, array);
         column(&columns[k], rows, size, *n, array, false);
         free(array);
     }
@@ -295,11 +369,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     int64_t n = w->bodies.n_global;
     assert(w->bodies.n == n); // nothing is distributed yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
-    for (bt_gid g = 0; g < n && !s->faulty; g++) {
-        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/disturbed", g,
-                         "is neither 0 nor 1");
-        put_row(w, bt_world_index(w, g), &rows[g]);
-    }
+    for (bt_gid g = 0; g < n && !s->faulty; g++) put_row(w, bt_world_index(w, g), &rows[g]);
     free(rows);
 }
 
@@ -308,14 +378,18 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 enum { MEMORY_WIDTH = sizeof(bt_memory) / sizeof(double) };
 _Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a record is a row of doubles");
 
+#define MEMORY(label, type, width, member, units, axes, check, meaning) \
+    MEMBER(bt_memory, label, type, width, member, units, axes, check, meaning)
 static const bt_state_row memory_columns[] = {
-    MEMBER(bt_memory, "a", I64, 1, a),
-    MEMBER(bt_memory, "b", I64, 1, b),
-    MEMBER(bt_memory, "part", U16, 2, part),
-    MEMBER(bt_memory, "points", I32, 1, n_points),
-    MEMBER(bt_memory, "feature", U32, 2, feature),
-    MEMBER(bt_memory, "value", F64, 4, value),
-    MEMBER(bt_memory, "law", U16, 1, law),
+    MEMORY("a", I64, 1, a, "1", "contact", ANY, "id of the first body of each contact"),
+    MEMORY("b", I64, 1, b, "1", "contact", ANY, "id of the second body of each contact"),
+    MEMORY("part", U16, 2, part, "1", "contact body_of_pair", ANY, "convex part of each of the two bodies"),
+    MEMORY("points", I32, 1, n_points, "1", "contact", ANY, "contact points, 1 or 2"),
+    MEMORY("feature", U32, 2, feature, "1", "contact contact_point", ANY,
+        "edge or corner by which a point is known again"),
+    MEMORY("value", F64, 4, value, "1", "contact memory", FINITE,
+        "numbers that the law keeps, in its own units (N s for impulses)"),
+    MEMORY("law", U16, 1, law, "1", "contact", ANY, "index of the contact law that has the memory"),
 };
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
@@ -407,9 +481,14 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 
 // --- collisions, events ----------------------------------------------------------------------------------------------
 
+#define EVENT(member, type, units, axes, check, meaning) \
+    MEMBER(bt_event, #member, type, 1, member, units, axes, check, meaning)
 static const bt_state_row event_columns[] = {
-    MEMBER(bt_event, "time", F64, 1, time), MEMBER(bt_event, "kind", I64, 1, kind),
-    MEMBER(bt_event, "subject", I64, 1, subject), MEMBER(bt_event, "value", F64, 1, value)};
+    EVENT(time, F64, "s", "time", FINITE, "end of the step of each event"),
+    EVENT(kind, I64, "1", "time", ANY, "kind of each event"),
+    EVENT(subject, I64, "1", "time", COUNT, "branch or way-point, from 1"),
+    EVENT(value, F64, "1", "time", FINITE, "tension N, speed m/s or way m, by its kind"),
+};
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 

@@ -22,10 +22,7 @@
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 
-static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
 static const int32_t FAR = 1000000000; // cells, periods: as labels of cells are limited (cells.c)
-
-static bool counts(int64_t n) { return n >= 0 && (double)n <= MOST; }
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
@@ -85,26 +82,19 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     const double within = outside ? bt_min(sum, f->concentration * f->ice_area) : sum;
     if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(true, f->n, size, within, f->ice_area, why))
         want_ice(s, "field/ice_area", -1, why);
-    const bt_outline_counts *c = &f->outlines;
-    bt_snapshot_want(s,
-                     counts(c->read) && counts(c->turned) && counts(c->dropped) && counts(c->hulled) &&
-                         counts(c->split) && counts(c->parts) && counts(c->rounded) && counts(c->rounded_corners) &&
-                         counts(c->unnamed),
-                     "field/read", -1, "and what was done to outlines are not all counts");
 }
 
 // --- cells -----------------------------------------------------------------------------------------------------------
 
 typedef struct {
-    const char *corner, *side, *wrap, *low, *n;
+    const char *side, *wrap, *low, *n;
 } cell_names;
 
 /// One direction of the cells: as src/space/cells.c chooses them. in_cells: there are floes in them.
-static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cells, double period, double corner,
-                            double side, int32_t wrap, int32_t low, int32_t n)
+static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cells, double period, double side,
+                            int32_t wrap, int32_t low, int32_t n)
 {
-    bt_snapshot_want(s, isfinite(corner), name->corner, -1, "is not finite");
-    bt_snapshot_want(s, side > 0 && isfinite(side), name->side, -1, "is no width of a cell");
+    bt_snapshot_want(s, side > 0, name->side, -1, "is no width of a cell");
     bt_snapshot_want(s, period > 0 ? wrap == 1 || (wrap >= 4 && wrap % 2 == 0) : wrap == 0, name->wrap, -1,
                      "is no number of cells around this domain");
     if (s->faulty) return;
@@ -116,8 +106,8 @@ static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cell
 
 static void check_cells(const bt_world *w, bt_snapshot *s)
 {
-    static const cell_names x = {"cells/x0", "cells/side_x", "cells/wrap_x", "cells/low_x", "cells/n_x"},
-                            y = {"cells/y0", "cells/side_y", "cells/wrap_y", "cells/low_y", "cells/n_y"};
+    static const cell_names x = {"cells/side_x", "cells/wrap_x", "cells/low_x", "cells/n_x"},
+                            y = {"cells/side_y", "cells/wrap_y", "cells/low_y", "cells/n_y"};
     const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     double widest = 0;
@@ -127,16 +117,14 @@ static void check_cells(const bt_world *w, bt_snapshot *s)
         in_cells = true;
         widest = bt_max(widest, b->radius[i]);
     }
-    check_direction(s, &x, in_cells, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
-    check_direction(s, &y, in_cells, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
+    check_direction(s, &x, in_cells, w->par.period_x, t->side_x, t->wrap_x, t->low_x, t->n_x);
+    check_direction(s, &y, in_cells, w->par.period_y, t->side_y, t->wrap_y, t->low_y, t->n_y);
     bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "cells/n_x", -1,
                      "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "cells/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.
-    bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "cells/reach", -1,
+    bt_snapshot_want(s, t->reach >= widest * (1 - 1e-9), "cells/reach", -1,
                      "is less than the radius of a floe");
-    bt_snapshot_want(s, isfinite(t->heaviest) && t->heaviest >= 0, "cells/heaviest", -1, "is no mass");
-    bt_snapshot_want(s, counts(t->n_labellings), "cells/n_labellings", -1, "is no count");
     double slack = INFINITY;
     if (t->wrap_x != 1) slack = bt_min(slack, t->side_x - 2 * t->reach - t->margin_max);
     if (t->wrap_y != 1) slack = bt_min(slack, t->side_y - 2 * t->reach - t->margin_max);
@@ -151,24 +139,11 @@ static bool in_box(const bt_cells *t, const int32_t at[2])
     return at[0] >= t->low_x && at[0] - t->low_x < t->n_x && at[1] >= t->low_y && at[1] - t->low_y < t->n_y;
 }
 
-static bool is_share(double x) { return x >= 0 && x <= 1; }
-
 static void check_bodies(const bt_world *w, bt_snapshot *s)
 {
     const bt_bodies *b = &w->bodies;
     for (bt_gid g = 0; g < b->n_global && !s->faulty; g++) {
         const bt_idx i = bt_world_index(w, g);
-        const bt_pose *p = &b->pose[i];
-        const bt_vel *v = &b->vel[i];
-        bt_snapshot_want(s, isfinite(p->x) && isfinite(p->y) && isfinite(p->yaw), "bodies/pose", g, "is not finite");
-        bt_snapshot_want(s, isfinite(v->x) && isfinite(v->y) && isfinite(v->w), "bodies/velocity", g, "is not finite");
-        bt_snapshot_want(s, isfinite(b->path[i]) && b->path[i] >= 0, "bodies/path", g, "is no length");
-        const bt_exposure *e = &b->exposure[i];
-        bt_snapshot_want(s, is_share(e->skin) && is_share(e->water_form) && is_share(e->air_form), "bodies/exposure", g,
-                         "is no share");
-        const int32_t copy = b->home ? b->home[i].copy : 0;
-        bt_snapshot_want(s, copy >= -FAR && copy <= FAR, "bodies/copy", g, "is out of range");
-        bt_snapshot_want(s, b->lap[i] >= -FAR && b->lap[i] <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
         bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/cell", g, "is outside the box of the cells");
         bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/cell", g,
@@ -204,7 +179,6 @@ static void check_contacts(const bt_world *w, const bt_memory *memory, int64_t n
         bt_snapshot_want(s, has_part(b, i, t->part[0]) && has_part(b, j, t->part[1]), "contacts/part", k,
                          "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
-        bt_snapshot_want(s, bt_state_finite(t->value, 4), "contacts/value", k, "is not finite");
         bt_snapshot_want(s, t->law < BT_LAWS + w->par.added_laws, "contacts/law", k, "is no contact law");
         if (s->faulty) return;
         const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_law_applies(w, t->law, i, j));
@@ -219,38 +193,14 @@ static void check_tow(const bt_world *w, bt_snapshot *s)
 {
     const bt_tow *t = w->tow;
     bt_snapshot_want(s, t->time == (double)w->step * t->dt, "tow/time", -1, "is not that of the step");
-    const double place[] = {t->carriage_x, t->carriage_y, t->travel_x,  t->travel_y,  t->way,
-                            t->ux,         t->uy,         t->vessel.vx, t->vessel.vy, t->vessel.way};
-    bt_snapshot_want(s, bt_state_finite(place, sizeof place / sizeof *place), "tow/carriage_x", -1,
-                     "and what else moves with the tow are not all finite");
     bt_snapshot_want(s, t->mark >= 0 && t->mark <= t->path.n_marks, "tow/mark", -1,
                      "is no number of way-points passed");
-    for (int k = 0; k < BT_MAX_BRANCHES; k++)
-        bt_snapshot_want(s, isfinite(t->branch[k].lambda), k ? "tow/impulse_2" : "tow/impulse_1", -1, "is not finite");
-}
-
-static void check_window(const bt_world *w, bt_snapshot *s)
-{
-    const bt_window *v = w->window;
-    const double real[] = {v->start, v->rear, v->most, v->overtaken};
-    bt_snapshot_want(
-        s,
-        bt_state_finite(real, sizeof real / sizeof *real) && bt_state_finite(v->dropped, 3) &&
-            bt_state_finite(v->brought, 3),
-        "window/rear_in_ice", -1, "and what else belongs to it are not all finite");
-    bt_snapshot_want(
-        s, counts(v->renewed) && counts(v->kept) && counts(v->missed) && counts(v->waiting) && counts(v->renewed_now),
-        "window/renewed", -1, "and its other counters are not all counts");
 }
 
 /// Places of floes that enter a window are found from the drift.
 static void check_undisturbed(const bt_world *w, bt_snapshot *s)
 {
     const bt_undisturbed *v = w->undisturbed;
-    const double real[] = {v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
-    bt_snapshot_want(s, bt_state_finite(real, sizeof real / sizeof *real),
-                     "undisturbed/drift_x", -1,
-                     "and what else belongs to undisturbed ice are not all finite");
     if (!w->window) return;
     bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "undisturbed/drift_x", -1, "is out of range");
     bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "undisturbed/drift_y",
@@ -279,8 +229,6 @@ static void check_events(const bt_world *w, bt_snapshot *s)
     for (int64_t k = 0; k < w->events.n && !s->faulty; k++) {
         const bt_event *e = &w->events.event[k];
         bt_snapshot_want(s, e->kind >= 0 && e->kind < BT_EVENT_KINDS, "events/kind", k, "is no kind of event");
-        bt_snapshot_want(s, counts(e->subject), "events/subject", k, "is no number");
-        bt_snapshot_want(s, isfinite(e->time) && isfinite(e->value), "events/time", k, "and its value are not finite");
     }
 }
 
@@ -289,19 +237,10 @@ static void check_events(const bt_world *w, bt_snapshot *s)
 void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s)
 {
     if (s->faulty) return; // then arrays are missing
-    const bt_params *p = &w->par;
-    const double fluid[] = {p->water_u,   p->water_v,   p->air_u,   p->air_v,
-                            p->balance_u, p->balance_v, p->tilt_ax, p->tilt_ay};
-    bt_snapshot_want(s, w->step >= 0, "world/step", -1, "is negative");
-    bt_snapshot_want(s, isfinite(w->drift_x) && isfinite(w->drift_y), "world/drift_x", -1,
-                     "and drift_y are not finite");
-    bt_snapshot_want(s, bt_state_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1,
-                     "and what else is of water and air are not all finite");
     check_cells(w, s);
     if (!s->faulty) check_bodies(w, s);
     if (!s->faulty) check_contacts(w, memory, n, s);
     if (w->tow && !s->faulty) check_tow(w, s);
-    if (w->window && !s->faulty) check_window(w, s);
     if (w->undisturbed && !s->faulty) check_undisturbed(w, s);
     if (impacts && !s->faulty) check_impacts(w, s);
     check_events(w, s);

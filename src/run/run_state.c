@@ -180,17 +180,12 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
 #define ADD(name, text) sum += r->totals.phases.name;
     BT_WALL_PHASES(ADD)
 #undef ADD
-    const bt_stall *t = &r->totals.stall;
     check_frames(r, s);
     bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1,
                      "is no number of steps");
     bt_snapshot_want(s, r->guard.locked >= 0 && r->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
                      "is no number of steps");
     bt_snapshot_want(s, !(r->guard.energy < 0), "run/energy_limit", -1, "is no energy");
-    bt_snapshot_want(s,
-                     t->windows >= 0 && t->windows <= BT_MOST_STEPS &&
-                         isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y + t->ice + t->pull),
-                     "stall/windows", -1, "and what else tells whether the body stood still are no counts and numbers");
     bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "are not all finite");
     bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");
 }

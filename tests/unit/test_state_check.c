@@ -89,7 +89,7 @@ static const struct change {
     {0, "field/ice_area", 0, 1e30, NULL},
     {0, "field/concentration", 0, 5.8e301, NULL},
     {0, "field/pose", 5, INFINITY, NULL},
-    {0, "field/split", 0, -1, "field/read"},
+    {0, "field/split", 0, -1, NULL},
     {0, "world/step", 0, -1, NULL},
     {0, "step/water_u", 0, NAN, NULL},
     {0, "cells/side_x", 0, 0, NULL},
@@ -118,7 +118,7 @@ static const struct change {
     {0, "events/kind", 0, 77, NULL},
     {0, "tow/time", 0, 1e9, NULL},
     {0, "tow/mark", 0, 100, NULL},
-    {0, "tow/ux", 0, NAN, "tow/carriage_x"},
+    {0, "tow/ux", 0, NAN, NULL},
     {0, "tow/taut_1", 0, 3, NULL},
     {1, "cells/wrap_x", 0, 1e9, "cells/side_x"},
     {1, "cells/wrap_y", 0, 5, NULL},
@@ -129,6 +129,9 @@ static const struct change {
     {1, "window/rear_in_ice", 0, NAN, NULL},
     {1, "undisturbed/drift_x", 0, 1e300, NULL},
     {1, "window/renewed", 0, -1, NULL},
+    {1, "window/dropped", 2, NAN, NULL},
+    {0, "events/value", 0, INFINITY, NULL},
+    {0, "bodies/exposure", 1, 1.5, NULL},
 };
 enum { N_CASES = sizeof cases / sizeof *cases, N_CHANGES = sizeof changes / sizeof *changes };
 
