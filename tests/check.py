@@ -102,7 +102,7 @@ def nearest(file):
         return programs(rf'#include [<"]{re.escape(header)}[>"]') or [
             t for other, (tests, _) in MUTANTS.items() if pathlib.Path(other).parent == path.parent for t in tests]
     return [f"{p.parent.name}/{p.name}" for p in sorted(ROOT.glob("tests/[cp]*/test_*.py"))
-            if re.search(rf"\b{re.escape(path.stem)}\b", p.read_text())]
+            if re.search(rf"\b(?:import|from)\b.*\b{re.escape(path.stem)}\b|\b{re.escape(path.name)}\b", p.read_text())]
 
 
 def ready(tests):

@@ -65,7 +65,6 @@ typedef struct bt_law_total {
     int number;                      ///< of its law
     bt_total_rule rule;
     const char *name;                ///< in a checkpoint, under history
-    bool later;                      ///< not in checkpoints of before there was the law: then 0
     const char *key, *units, *description;
 } bt_law_total;
 

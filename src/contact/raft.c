@@ -35,19 +35,19 @@ static const bt_law_number numbers[] = {
 enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MOST_AREA, LARGEST_PAIR, ALL_ENERGY,
        ALL_EDGE_WORK, ALL_FRICTION_WORK };
 static const bt_law_total totals[] = {
-    [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", true, "rafting_pairs", "1",
+    [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", "rafting_pairs", "1",
                    "pairs of floes that lie over each other, at the end"},
-    [ALL_AREA] = {AREA, BT_TOTAL_LAST, "rafted_area", true, "rafted_area_m2", "m2",
+    [ALL_AREA] = {AREA, BT_TOTAL_LAST, "rafted_area", "rafted_area_m2", "m2",
                   "area in which they do, pair by pair, at the end"},
-    [MOST_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", true, "max_rafted_area_m2", "m2",
+    [MOST_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", "max_rafted_area_m2", "m2",
                    "the largest such area of a step"},
-    [LARGEST_PAIR] = {LARGEST, BT_TOTAL_MAX, "rafted_largest", true, "largest_rafted_pair_m2", "m2",
+    [LARGEST_PAIR] = {LARGEST, BT_TOTAL_MAX, "rafted_largest", "largest_rafted_pair_m2", "m2",
                       "the largest area of one pair"},
-    [ALL_ENERGY] = {ENERGY, BT_TOTAL_LAST, "rafted_energy", true, "rafted_energy_j", "J",
+    [ALL_ENERGY] = {ENERGY, BT_TOTAL_LAST, "rafted_energy", "rafted_energy_j", "J",
                     "potential energy of floes that lie over each other, above that of floes side by side, at the end"},
-    [ALL_EDGE_WORK] = {EDGE_WORK, BT_TOTAL_SUM, "raft_edge_work", true, "raft_edge_work_j", "J",
+    [ALL_EDGE_WORK] = {EDGE_WORK, BT_TOTAL_SUM, "raft_edge_work", "raft_edge_work_j", "J",
                        "work taken by edges that raft"},
-    [ALL_FRICTION_WORK] = {FRICTION_WORK, BT_TOTAL_SUM, "raft_friction_work", true, "raft_friction_work_j", "J",
+    [ALL_FRICTION_WORK] = {FRICTION_WORK, BT_TOTAL_SUM, "raft_friction_work", "raft_friction_work_j", "J",
                            "work taken by friction between floes that lie over each other"},
 };
 
