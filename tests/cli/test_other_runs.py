@@ -7,12 +7,9 @@ import subprocess
 import sys
 import time
 
-import h5py
 import pytest
 
 from harness import BERGTOW, CASE, DONE, ROOT, TOW, Run, call, changed, environment, run, write_case
-from made_up_ensemble import seal
-from resuming import assert_same_result
 
 SHORT = changed(TOW, run__duration=16, output__sample_every=3)
 OTHERS = {"another speed": {"tow__speed": 0.05}, "another seed": {"ice__seed": 9},

@@ -234,7 +234,7 @@ static void a_lead_goes_over_the_seam(void **state)
     }
 }
 
-/// Of a field file of before, which does not say where its ice region is, nobody knows the concentration after a lead.
+/// Of a field file that does not say where its ice region is, nobody knows the concentration after a lead.
 static void an_unnamed_region_leaves_the_concentration_unknown(void **state)
 {
     (void)state;
