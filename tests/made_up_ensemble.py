@@ -2,15 +2,12 @@
 """An ensemble's folder with numbers of the test's own, of the layout that src/run/ensemble_file.c writes."""
 import json
 import re
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "postproc"))
-
-import soundness  # noqa: E402
+from bergtow.result import integrity as soundness
 
 FINISHED, FAILED, WAITING = 1, 2, 0
 UNITS = {"ice.concentration": "1", "tow.speed": "m/s", "ice.thickness": "m", "ice.friction": "1"}

@@ -15,26 +15,15 @@ from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int64, c_size_t
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .errors import CASE, IO, OK, USAGE, BergtowError, CaseError
+
 if TYPE_CHECKING:
     from .case import Case
 
 SONAME = "libbergtow.so.0"
-OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 LOADS = 10  # BT_APPLIED_NUMBERS
 CONTACT_COLUMNS = 12  # BT_CONTACT_COLUMNS
 MOST_THREADS = 1024  # BT_MOST_THREADS
-
-
-class BergtowError(Exception):
-    """A call of the library that failed. status: the exit code that the command `bergtow` ends with."""
-
-    def __init__(self, text: str, status: int = USAGE) -> None:
-        super().__init__(text)
-        self.status = status
-
-
-class CaseError(BergtowError, ValueError):
-    """A case that is refused; the text has one line for each error, with key and remedy."""
 
 
 class Options(ctypes.Structure):

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any
 
 from . import _library
-from ._library import CaseError
+from .errors import CaseError
 
 
 @functools.cache

@@ -2,7 +2,6 @@
 """Case files with a base: what they mean, what is refused, and that every command and script takes them."""
 import json
 import random
-import sys
 
 import h5py
 import pytest
@@ -11,10 +10,9 @@ import yaml
 import random_cases
 from harness import BERGTOW, CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import case_file  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-import report_case  # noqa: E402
+from bergtow.study import case_file
+from bergtow.result.run import Run
+from bergtow.result import origins as report_case
 
 SHORT = changed(TOW, run__duration=4, run__title="the base", output={"window_start": 2})
 NEARER = {"base": "sub/middle.yml", "run": {"title": "the nearest"}, "tow.speed": 0.2}

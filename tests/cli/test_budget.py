@@ -3,8 +3,6 @@
 and a study end to end."""
 import json
 import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,18 +12,18 @@ from scipy import stats
 import made_up_ensemble as made_up
 from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import analysis  # noqa: E402
-import budget  # noqa: E402
-import budget_text  # noqa: E402
-import compared  # noqa: E402
-import stat_budget  # noqa: E402
-import stat_load  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
-from command import plain  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-from test_loads import SERIES  # noqa: E402
+from bergtow import cli
+from bergtow.study import analysis
+from bergtow.study import budget
+from bergtow.text import budget as budget_text
+from bergtow.result import compared
+from bergtow.stats import variance as stat_budget
+from bergtow.stats import load as stat_load
+from bergtow.errors import RunError
+from bergtow.result.run import Run
+from bergtow.writing import plain
+from bergtow.result.members import Ensemble
+from test_loads import SERIES
 
 
 def latin(n, k, rng):
@@ -251,7 +249,7 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(budget, "run_members", lambda *a: False)
     (tmp_path / "study.yml").write_text("")
     with pytest.raises(RunError, match=r"2 of 40 members failed \(c019-r001, c020-r002\)"):
-        budget.main([str(tmp_path / "study.yml"), "-o", str(folder)])
+        cli.perform("budget", tmp_path / "study.yml", "-o", folder)
     found, said = json.loads((folder / "budget.json").read_text()), capsys.readouterr().out
     assert found["mean_95"] == found["fields"]["sd_95"] == [None, None] and found["mean"] > 0
     assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
@@ -339,7 +337,7 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("budget")
     write_case(folder, BASE, "base.yml")
     write_case(folder, STUDY, "study.yml")
-    done = script("budget.py", "study.yml", "-o", "out", "--budget", "3", cwd=folder)
+    done = script("budget", "study.yml", "-o", "out", "--budget", "3", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -400,7 +398,7 @@ def test_a_study_end_to_end(small):
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
     def with_it(row, values):
         (folder / "converge.json").write_text(json.dumps({"rows": [row], "values": values}))
-        again = script("budget.py", "study.yml", "-o", "out", "--converge", "converge.json", cwd=folder)
+        again = script("budget", "study.yml", "-o", "out", "--converge", "converge.json", cwd=folder)
         assert again.returncode == 0, again.stderr
         return again.stdout, json.loads((folder / "out/budget.json").read_text())["numerics"]
     said, numerics = with_it(row, case)
@@ -417,7 +415,7 @@ def test_what_is_refused(small, tmp_path):
     def said(study, *more, out="refused", code=4):
         write_case(tmp_path, BASE, "base.yml")
         write_case(tmp_path, study, "study.yml")
-        done = script("budget.py", "study.yml", "-o", out, *more, cwd=tmp_path)
+        done = script("budget", "study.yml", "-o", out, *more, cwd=tmp_path)
         assert done.returncode == code and "Traceback" not in done.stderr
         return done.stderr
     def varied(**entry):

@@ -2,23 +2,21 @@
 """postproc/capability.py: the search of a limit on trials of known chance, and the curve against brute-force runs."""
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import analysis  # noqa: E402
-import bracket  # noqa: E402
-import capability  # noqa: E402
-import capability_text  # noqa: E402
-import case_runs  # noqa: E402
-from bergtow_read import Run  # noqa: E402
+from bergtow.study import analysis
+from bergtow.study import bracket
+from bergtow.study import capability
+from bergtow.text import capability as capability_text
+from bergtow.study import runs as case_runs
+from bergtow.result.run import Run
 
 THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
                  ice__concentration=0.5, ice__size=0.6, ice__friction=0.2, body__length=1, tow__mode="thrust",
@@ -221,7 +219,7 @@ def test_a_stop_that_is_ordered_is_no_stop_in_the_ice(tmp_path):
 
 def found_in(folder, case, *more, code=0):
     write_case(folder, case)
-    done = script("capability.py", "case.yml", "-o", "out", *more, cwd=folder)
+    done = script("capability", "case.yml", "-o", "out", *more, cwd=folder)
     assert done.returncode == code, done.stderr
     if code:
         return done.stderr
@@ -432,14 +430,12 @@ def test_its_block_for_a_report(tmp_path):
 
 
 def test_the_band_of_a_tow_that_is_driven_back_lies_about_its_curve():
-    import matplotlib.pyplot as plt
-    axes = plt.figure().add_subplot()
+    axes = Figure().add_subplot()
     c = {"label": "the case", "points": [
         {"value": v, "fields": 2, "speed": [mean - 0.1, mean + 0.1], "mean_speed": mean,
          "mean_speed_95": [mean - 0.3, mean + 0.3]} for v, mean in ((0.5, 0.2), (0.9, -0.4))]}
     capability_text._curve(axes, c, "speed", "k", 1.0, 1.0)
     band = axes.collections[0].get_paths()[0].vertices
-    plt.close("all")
     assert [band[band[:, 0] == v, 1].min() for v in (0.5, 0.9)] == pytest.approx([0.0, -0.5])
 
 

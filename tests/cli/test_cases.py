@@ -3,7 +3,6 @@
 it is from.
 """
 import re
-import sys
 
 import h5py
 import numpy as np
@@ -12,8 +11,7 @@ import yaml
 
 from harness import BERGTOW, DONE, ROOT, call, run
 
-sys.path.insert(0, str(ROOT / "postproc"))
-from case_file import is_study  # noqa: E402
+from bergtow.study.case_file import is_study
 
 FIELD = ROOT / "cases/field"
 NAMES = ["barents-2004", "barents-2005", "bohai-2013", "kara-2017", "kulluk-1983"]

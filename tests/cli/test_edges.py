@@ -190,7 +190,7 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
     path = write_case(tmp_path, changed(TOW, tow__mode="thrust", tow__line_length=2, tow__line_stiffness=5000,
                                         tow__vessel={"mass": 300, "bollard_pull": 10, "free_speed": 0.5}))
     def said(*words):
-        return script("capability.py", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
+        return script("capability", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
     for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
                          (("--resolution", "1 m"), "--resolution 1 m: is no number"),
                          (("--speed", "0 m/s"), "--speed 0 m/s: is not above 0"),

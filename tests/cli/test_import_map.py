@@ -6,7 +6,6 @@ by GDAL's own ogr2ogr; what comes out is read by the program's C reader, which h
 """
 import json
 import subprocess
-import sys
 
 import h5py
 import netCDF4
@@ -19,16 +18,14 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 import tutorial
-from harness import DONE, IO, ROOT, USAGE, call, changed, environment, run
+from harness import DONE, IO, USAGE, call, changed, environment, run
 from test_map import FRAMES
 from test_outlines import field, same_ring
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import map_read  # noqa: E402
-import map_stairs  # noqa: E402
-import outlines as command_line  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow import cli  # noqa: E402
+from bergtow.maps import read as map_read  # noqa: E402
+from bergtow.maps import stairs as map_stairs  # noqa: E402
+from bergtow.errors import BergtowError, RunError  # noqa: E402
 
 gdal.UseExceptions()
 GEOD = Geod(ellps="WGS84")
@@ -77,10 +74,10 @@ def outlines(map_, *words, code=DONE, name="out.geojson"):
     words = [str(w) for w in (map_, "-o", out, "--record", out.with_suffix(".json"), "--force", *words)]
     if code != DONE:
         with pytest.raises(RunError) as error:
-            command_line.main(words)
+            cli.perform("outlines", *words)
         assert not out.exists()
         return str(error.value)
-    command_line.main(words)
+    cli.perform("outlines", *words)
     root = json.loads(out.read_text())
     rings = [np.array(f["geometry"]["coordinates"][0][:-1]) for f in root["features"]]
     return rings, json.loads(out.with_suffix(".json").read_text())
@@ -922,12 +919,12 @@ def test_bad_maps(tmp_path, name):
     (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
     (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
     (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])
-def test_usage(tmp_path, words, says, capsys, monkeypatch):
+def test_usage(tmp_path, words, says, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "map.geojson", [places(RINGS[0])])
-    with pytest.raises(SystemExit) as end:
-        command_line.main(["map.geojson", *([] if "-o" in words else ["-o", "out.geojson"]), *words, "--force"])
-    assert end.value.code == USAGE and says in capsys.readouterr().err
+    with pytest.raises(BergtowError) as end:
+        cli.perform("outlines", "map.geojson", *([] if "-o" in words else ["-o", "out.geojson"]), *words, "--force")
+    assert end.value.status == USAGE and says in str(end.value)
     assert [p.name for p in tmp_path.iterdir()] == ["map.geojson"]
 
 
@@ -949,7 +946,6 @@ def test_a_missing_library_is_named(tmp_path):
 @pytest.mark.slow
 def test_from_python(tmp_path):
     """The same file and numbers as the command's; what is not understood is its message."""
-    sys.path.insert(0, str(ROOT / "postproc"))
     import bergtow
     write(tmp_path / "map.geojson", [places(RINGS[0])])
     r = call("outlines", "map.geojson", "-o", "theirs.geojson", f"--centre={LON},{LAT}", "--record", "theirs.json",

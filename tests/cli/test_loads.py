@@ -4,11 +4,8 @@ import argparse
 import csv
 import json
 import shutil
-import sys
-from pathlib import Path
 
 import h5py
-import matplotlib
 import numpy as np
 import pytest
 from scipy import stats
@@ -17,22 +14,20 @@ import made_up_ensemble as made_up
 from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import ensemble  # noqa: E402
-import ensemble_text  # noqa: E402
-import loads  # noqa: E402
-import loads_text  # noqa: E402
-import report_method  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_loads  # noqa: E402
-import stat_alike  # noqa: E402
-import stat_extreme  # noqa: E402
-import stat_load  # noqa: E402
-import statement as statement_module  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-from report_ensemble import OPTIONS  # noqa: E402
+from bergtow.stats import conditions as ensemble
+from bergtow.text import ensemble as ensemble_text
+from bergtow.stats import loads
+from bergtow.text import loads as loads_text
+from bergtow.reporting import method as report_method
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import loads as plot_loads
+from bergtow.stats import alike as stat_alike
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import load as stat_load
+from bergtow.stats import design_value as statement_module
+from bergtow.result.run import Run
+from bergtow.result.members import Ensemble
+from bergtow.reporting.ensemble import OPTIONS
 
 TRIALS = 14
 
@@ -233,7 +228,7 @@ def test_warnings_name_the_reason_of_the_verdict(tmp_path):
                            window={"verdict": "not steady" if why else "steady"}) for k, why in enumerate(reasons)]
     some += [made_up.member(np.ones(100), {"ice.concentration": 0.9}, 1, status=made_up.FAILED, reason="exit code 5")
              for _ in range(2)]
-    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
+    result = script("statistics", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
                     "--time-scale", 10)
     assert result.returncode == 0, result.stderr
     warned = [line.removeprefix("WARNING: ") for line in result.stdout.splitlines() if line.startswith("WARNING")]
@@ -262,7 +257,7 @@ def test_a_condition_whose_fields_differ_is_warned_of(tmp_path):
             x = 1e6 + 1e5 * np.exp(spread * rng.standard_normal()) * made_up.ar1(0.8, N, rng)
             some.append(made_up.member(x, {"ice.concentration": 0.5 + 0.1 * c}, c, more={"tow_force": x},
                                        attributes=SERIES, case=CASE.format(pressure=1, load=0)))
-    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1)
+    result = script("statistics", made_up.write(tmp_path / "all", some), "--resamples", 1)
     said = [line for line in result.stdout.splitlines() if "fields differ by more than chance" in line]
     assert len(said) == 1 and "concentration 60 % (8 fields, p < 0.0001)" in said[0] and "50 %" not in said[0]
     assert result.stdout.count("fields that are alike") >= 3  # table of the design, its warning, return levels
@@ -387,7 +382,7 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
 @pytest.fixture(scope="module")
 def statement(tmp_path_factory):
     folder = towed(tmp_path_factory.mktemp("towed") / "all")
-    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10)
+    result = script("statistics", folder, "--resamples", 5, "--hours", 1, 10)
     assert result.returncode == 0, result.stderr
     return folder, result.stdout, json.loads((folder / "statistics.json").read_text())
 
@@ -514,7 +509,7 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
     for ramp_s, jerk, words in ((20, 2e6, "while the ramp of 20 s accelerates the body; a longer ramp takes less: "
                                  "concentration 50 % (2.00 MN)."), (20, 1e6, None)):
         some = towed(tmp_path / f"{jerk:g}", fields=5, text=ramp.format(ramp_s), jerk=jerk)
-        said = script("ensemble.py", some, "--resamples", 1).stdout
+        said = script("statistics", some, "--resamples", 1).stdout
         assert words in said if words else "the start, which is left out" not in said
         assert "in the start" in said  # the column
 
@@ -527,7 +522,7 @@ def test_a_warning_of_many_conditions_names_the_first():
 @pytest.mark.slow
 def test_options_of_the_design_value(statement, tmp_path):
     folder, _, before = statement
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--tow-hours", 2, "--probability", 0.5)
+    result = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--tow-hours", 2, "--probability", 0.5)
     s = json.loads((tmp_path / "statistics.json").read_text())
     assert "exceeded with a probability of 50 % in a tow of 2 h, as the moving mean over 30 s" in result.stdout
     for a, b in zip(s["conditions"], before["conditions"]):
@@ -535,8 +530,8 @@ def test_options_of_the_design_value(statement, tmp_path):
         assert a["design"]["tow"]["value"] < b["design"]["tow"]["value"], "once in 2.9 h, not in 468 h"
         assert a["loads"]["tow_force"]["sd"] == b["loads"]["tow_force"]["sd"]
     for option in ("--time-scale", "--tow-hours", "--probability"):
-        assert script("ensemble.py", folder, option, "0").returncode == 2
-    step = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
+        assert script("statistics", folder, option, "0").returncode == 2
+    step = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
     assert "a step mean is no peak (1 s)" in step.stdout
 
 
@@ -551,7 +546,7 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     e.summary["estimates_length_scale"] = np.full(e.n, 25.0)
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
-    found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
+    found = script("statistics", tmp_path / "a", "--resamples", 1).stdout
     assert "no upper bound" not in found
     above = "above the breaking load of the line"
     assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
@@ -562,10 +557,10 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
 def test_too_little_is_reported_and_not_guessed(tmp_path):
     short = [made_up.member(np.arange(60.0), {}, 0, more={"tow_force": np.arange(60.0)}, attributes=SERIES)
              for _ in range(2)]
-    result = script("ensemble.py", made_up.write(tmp_path / "s", short), "--resamples", 1)
+    result = script("statistics", made_up.write(tmp_path / "s", short), "--resamples", 1)
     assert result.returncode == 0 and "No design tow force" in result.stdout and "Traceback" not in result.stderr
     some = towed(tmp_path / "two", concentrations=(0.5,), fields=2)
-    result = script("ensemble.py", some, "--resamples", 1, "--time-scale", 150)
+    result = script("statistics", some, "--resamples", 1, "--time-scale", 150)
     s = json.loads((some / "statistics.json").read_text())
     warnings = [w["what"] for w in s["conditions"][0]["design"]["warnings"]]
     assert "no value" in warnings and "refused" in s["conditions"][0]["design"]["tow"]
@@ -647,7 +642,6 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
     for name in ("tow_force", "vessel_thrust"):
         plot_ensemble.draw_above(e, s["conditions"], name)
         plot_ensemble.draw_returns(e, s["conditions"], name)
-    matplotlib.pyplot.close("all")
 
 
 def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
@@ -724,7 +718,7 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     s, text = of_all(folder)
     e, (c,) = Ensemble(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
-    told = script("ensemble.py", folder, "--resamples", 1, "--force").stderr
+    told = script("statistics", folder, "--resamples", 1, "--force").stderr
     assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
     towed = e.series(0)[1][300:900].mean()
     assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
@@ -813,4 +807,3 @@ def test_the_picture_of_return_levels(statement):
     figure = plot_ensemble.draw_returns(e, s["conditions"], "tow_force")
     assert "no design value" in str([t.get_text() for t in figure.texts])
     assert not [line for line in figure.axes[0].lines if line.get_marker() == "D"]
-    matplotlib.pyplot.close("all")

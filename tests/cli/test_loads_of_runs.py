@@ -3,24 +3,21 @@
 loads, against the series of the members by plain NumPy."""
 import argparse
 import json
-import sys
 
 import h5py
 import numpy as np
 import pytest
 from scipy import stats
 
-from harness import ROOT, TOW, call, changed, write_case
+from harness import TOW, call, changed, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import ensemble  # noqa: E402
-import loads_text  # noqa: E402
-import plot_ensemble  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_method  # noqa: E402
-import statement  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow.stats import conditions as ensemble
+from bergtow.text import loads as loads_text
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import method as report_method
+from bergtow.stats import design_value as statement
+from bergtow.result.members import Ensemble
 
 N = 4
 VESSEL = changed(TOW, run={"dt": 0.05, "duration": 40}, domain={"length": 30, "width": 10},

@@ -5,7 +5,6 @@ Each scene has so little work that its steps do not converge; the answer is know
 bodies that have a way out are called locked, a lock is not found (also across ranks), what rafts counts as hard, the
 summary advises more sweeps against a lock, or prints its loads as numbers.
 """
-import sys
 from types import SimpleNamespace
 
 import h5py
@@ -14,13 +13,12 @@ import pytest
 import scipy.optimize
 import scipy.sparse
 
-from harness import NUMERIC, ROOT, Run, area, changed, differing, quick, run, warned, write_case
+from harness import NUMERIC, Run, area, changed, differing, quick, run, warned, write_case
 from resuming import done
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import bergtow_read  # noqa: E402
-import loads  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow.result import run as bergtow_read
+from bergtow.stats import loads
+from bergtow.result.members import Ensemble
 
 A = 1.0
 TOWED = {

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
+from bergtow import cli
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -324,17 +325,26 @@ def test_a_missing_module_is_a_message(tmp_path):
         assert f"{name} is missing" in said and f"python3-{name}" in said
 
 
-SCRIPTS = sorted(p.name for p in (ROOT / "postproc").glob("*.py") if "__main__" in p.read_text())
-
-
-@pytest.mark.parametrize("script", SCRIPTS)
-def test_a_python_without_packages_is_a_message(script):
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_a_python_without_packages_is_a_message(command):
     """-S: no site-packages, as in a Python of another origin."""
-    assert len(SCRIPTS) >= 15
-    said = subprocess.run([sys.executable, "-S", ROOT / "postproc" / script, "x"], capture_output=True, text=True)
-    assert said.returncode == IO and said.stderr.startswith((f"{script}: ", f"bergtow {script[:-3]}: "))
-    assert said.stderr.count("\n") == 1
-    assert re.search(rf"\w+ is missing in {sys.executable} .*; install python3-\w+ \(Debian\)", said.stderr)
+    said = subprocess.run([sys.executable, "-S", "-m", "bergtow", command, "x"], capture_output=True, text=True,
+                          env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")})
+    assert said.returncode == IO and said.stderr.startswith("bergtow: bergtow needs numpy, which ")
+    assert said.stderr.count("\n") == 1 and "python3-numpy (Debian)" in said.stderr
+
+
+def test_the_program_and_the_package_have_the_same_commands():
+    """Each command of the package in `bergtow --help`, in its words; the program's others reach it from Python."""
+    listed = dict(re.findall(r"^  ([a-z-]+) +(\S.*)$", call("--help").stdout, re.M))
+    assert {name: listed.get(name) for name in cli.COMMANDS} == {name: about for name, (_, about) in
+                                                                 cli.COMMANDS.items()}
+    others = [name for name in listed if name not in cli.COMMANDS]
+    assert len(others) >= 7
+    for name in others:
+        said = subprocess.run([sys.executable, "-m", "bergtow", name, "--help"], capture_output=True, text=True,
+                              env=os.environ | {"PYTHONPATH": str(ROOT / "postproc"), "BERGTOW": str(BERGTOW)})
+        assert said.stdout == call(name, "--help").stdout
 
 
 def test_the_package_in_a_python_without_numpy():

@@ -5,8 +5,6 @@ import argparse
 import json
 import re
 import shutil
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -17,18 +15,16 @@ from browser import browser, complaints, opened
 from harness import TOW, call, changed, write_case
 from made_up_ensemble import FAILED, WAITING, member
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import ensemble  # noqa: E402
-import loads_text  # noqa: E402
-import report  # noqa: E402
-import report_case  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_method  # noqa: E402
-import stat_budget  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
-from command import plain  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow import cli
+from bergtow.stats import conditions as ensemble
+from bergtow.text import loads as loads_text
+from bergtow.result import origins as report_case
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import method as report_method
+from bergtow.stats import variance as stat_budget
+from bergtow.errors import RunError
+from bergtow.writing import plain
+from bergtow.result.members import Ensemble
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
 JAM = "the towed body stood still for 40 s of 600 s <i>: a jam"
@@ -59,7 +55,7 @@ def page(study, tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     path = tmp_path_factory.mktemp("elsewhere") / "page.html"
-    report.main([str(study), "-o", str(path)])
+    cli.perform("report", study, "-o", path)
     patch.undo()
     with browser(tmp_path_factory.mktemp("profile")) as driver:
         driver.requests = [r for r in opened(driver, path) if not r.startswith("data:")]
@@ -163,7 +159,7 @@ def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode)
                       attributes={"tow_force": line | {"role": "balance", "needs": "body"},
                                   "line_tension_1": line})
     folder = made_up.write(tmp_path / "out", [one(c) for c in (0, 1) for _ in range(4)])
-    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    cli.perform("report", folder, "-o", tmp_path / "page.html")
     text, there = (tmp_path / "page.html").read_text(), mode == "line"
     assert ("Design tow force and line tension in broken ice" in text) == there == ("Line tensions are" in text)
     assert ("Design tow force in broken ice" in text) != there and "statistics.json" not in text
@@ -243,7 +239,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     for name, content in found.items():
         (folder / f"{name}.json").write_text(json.dumps(plain(content)))
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
-    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    cli.perform("report", folder, "-o", tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
     at = [text.rindex(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
                                           "every value of the range makes it")]
@@ -389,7 +385,7 @@ def test_a_half_finished_ensemble(tmp_path, monkeypatch):
     folder = made_up.write(tmp_path / "half", some)
     (folder / "members/c002-r001").mkdir(exist_ok=True)
     (folder / "members/c002-r001/finished").write_text("")
-    report.main([str(folder)])
+    cli.perform("report", folder)
     text = (folder / "report.html").read_text()
     for part in ("3 of 9 members in 3 conditions.", "not complete: 6 members to come",
                  "1 member of these finished after ensemble.h5 was made",
@@ -413,16 +409,16 @@ def test_nothing_has_finished(tmp_path, status, behind, reported):
     if behind:
         (folder / "members/c001-r001/finished").write_text("")
     with pytest.raises(RunError) as error:
-        report.main([str(folder)])
+        cli.perform("report", folder)
     assert reported in str(error.value)
     (folder / "ensemble.h5").unlink()
     (folder / "study.resolved.yml").write_text("seed: 1\n")
     with pytest.raises(RunError, match="holds no ensemble.h5; .*run it again"):
-        report.main([str(folder)])
+        cli.perform("report", folder)
 
 
 def test_an_unusable_ensemble_is_reported(tmp_path, capsys, monkeypatch):
     (tmp_path / "ensemble.h5").write_bytes(b"no")
     with pytest.raises(RunError, match="is no ensemble"):
-        report.main([str(tmp_path)])
+        cli.perform("report", tmp_path)
     assert not (tmp_path / "report.html").exists()

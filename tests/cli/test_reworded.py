@@ -8,7 +8,6 @@ import shutil
 import sys
 
 import h5py
-import matplotlib.pyplot
 import numpy as np
 import pytest
 
@@ -16,16 +15,14 @@ import made_up_ensemble as made_up
 import script_copy
 from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import ensemble  # noqa: E402
-import loads  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_force  # noqa: E402
-import report_ensemble  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-from command import plain as plain_data  # noqa: E402
-from ensemble_read import DOUBTS, Ensemble  # noqa: E402
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import loads
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import force as plot_force
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.result.run import Run
+from bergtow.writing import plain as plain_data
+from bergtow.result.members import DOUBTS, Ensemble
 
 # Bridles that part in dense ice, short windows, and loose ice that a body hardly meets.
 CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=16, domain__width=6, ice__size=0.6,
@@ -115,7 +112,6 @@ def drawn(figure):
         legend = axes.get_legend()
         said += [axes.get_xlabel(), axes.get_ylabel(), *(t.get_text() for t in (legend.get_texts() if legend else ()))]
     said += [t.get_text() for t in figure.texts]
-    matplotlib.pyplot.close(figure)
     return numbers, said
 
 
@@ -244,11 +240,11 @@ def test_commands_that_make_runs(tmp_path):
     found = {}
     for name, binary in (("plain", BERGTOW), ("other", str(program))):
         def made(script, *words):
-            return script_copy.called([str(ROOT / "postproc" / script), *words], tmp_path, environment()
+            return script_copy.called([script, *words], tmp_path, environment()
                                       | {"BERGTOW": binary, "OMP_NUM_THREADS": "1"}, 300)
-        whole = made("converge.py", "case.yml", "-o", name, "--vary", "tolerance", "--jobs", "2")
-        failed = made("converge.py", "fails.yml", "-o", f"{name}-fails", "--vary", "dt", "--jobs", "1")
-        spent = made("converge.py", "case.yml", "-o", f"{name}-spent", "--vary", "dt", "--jobs", "1",
+        whole = made("converge", "case.yml", "-o", name, "--vary", "tolerance", "--jobs", "2")
+        failed = made("converge", "fails.yml", "-o", f"{name}-fails", "--vary", "dt", "--jobs", "1")
+        spent = made("converge", "case.yml", "-o", f"{name}-spent", "--vary", "dt", "--jobs", "1",
                      "--budget", "0.001", "--set", "run.dt=0.0002 s")
         rows = json.loads((tmp_path / name / "converge.json").read_text())
         found[name] = ([done.returncode for done in (whole, failed, spent)], rows["rows"], rows["verdicts"])

@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The methods behind postproc/ensemble.py against known answers: coverage of intervals, SciPy's fits, closed forms of
 extremes and of sensitivities."""
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import signal, stats
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import stat_extreme  # noqa: E402
-import stat_fit  # noqa: E402
-import stat_mean  # noqa: E402
-import stat_profile  # noqa: E402
-import stat_sensitivity  # noqa: E402
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import fit as stat_fit
+from bergtow.stats import mean as stat_mean
+from bergtow.stats import profile as stat_profile
+from bergtow.stats import sensitivity as stat_sensitivity
 
 TRIALS = 2000
 

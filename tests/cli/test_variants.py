@@ -10,11 +10,9 @@ import yaml
 import made_up_ensemble
 from harness import ROOT, call, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import plot_ensemble  # noqa: E402
-import plot_variants  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow import cli
+from bergtow.plot import variants as plot_variants
+from bergtow.result.members import Ensemble
 
 BASE = {
     "run": {"title": "t", "dt": 0.1, "duration": 6}, "domain": {"length": 16, "width": 8},
@@ -71,7 +69,7 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
             np.testing.assert_allclose([of, change], [means[name], 100 * (means[name] / mean - 1)], rtol=1e-9)
             assert half > 0
         assert changes[1][2] > 20, "twice the mass of ice loads the body more"
-    plot_ensemble.main([str(tmp_path / "out")])
+    cli.perform("plot-ensemble", tmp_path / "out")
     assert (tmp_path / "out/variants.png").stat().st_size > 10000
 
 
