@@ -29,3 +29,11 @@ def pytest_collection_modifyitems(items):
 def library():
     """The shared library, which the Python package loads."""
     harness.make("lib")
+
+
+@pytest.fixture
+def look():
+    """Settings of matplotlib as a command has them, for figures that a test draws itself."""
+    from bergtow.plot import style  # not before: most tests draw nothing
+    with style.look():
+        yield

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands of the Python package, and scripts, in copies of a process that has loaded their libraries: half of what most
-calls cost is the start of Python, HDF5, matplotlib and scipy. What the process of the tests holds is not in the copies.
-"""
+"""Commands of the Python package, and scripts, in copies of a process that has loaded their libraries: half of what
+most calls cost is the start of Python, HDF5, matplotlib and scipy. What the process of the tests holds is not in the
+copies."""
 import functools
 import gc
 import importlib

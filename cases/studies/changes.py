@@ -17,15 +17,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
-from bergtow import writing  # noqa: E402
+from bergtow import arguments, writing  # noqa: E402
 from bergtow.cli import command  # noqa: E402
 from bergtow.plot import style  # noqa: E402
-from bergtow.text import table as text_table  # noqa: E402
+from bergtow import table as text_table  # noqa: E402
 from bergtow.errors import RunError  # noqa: E402
 from bergtow.result.members import Ensemble, reading, short_key, worded  # noqa: E402
 from bergtow.plot.variants import relative_change  # noqa: E402
 from bergtow.stats.mean import t_interval  # noqa: E402
-from bergtow.text.table import number  # noqa: E402
+from bergtow.table import number  # noqa: E402
 
 
 LINES = ((style.INK, "-"), (style.ICE, "-"), (style.ICE, "--"), (style.TOW, "-"), (style.TOW, "--"), (style.DRAG, "-"),
@@ -163,7 +163,7 @@ def main():
     p.add_argument("base", metavar="BASE")
     p.add_argument("others", metavar="OTHER", nargs="+")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("changes.png"))
-    command.add_force(p)
+    arguments.add_force(p)
     a = p.parse_args()
     if a.output.suffix.lower() not in writing.PICTURES:
         p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(writing.PICTURES)}")

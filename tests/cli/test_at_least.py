@@ -25,7 +25,7 @@ from bergtow.stats import conditions as ensemble  # noqa: E402
 import made_up_ensemble as made_up  # noqa: E402
 from bergtow.plot import resistance as plot_resistance  # noqa: E402
 from bergtow.reporting import run as report_run  # noqa: E402
-from bergtow.text import table as text_table  # noqa: E402
+from bergtow import table as text_table  # noqa: E402
 from bergtow.result.at_least import AtLeast  # noqa: E402
 from bergtow.errors import RunError  # noqa: E402
 from bergtow.result.run import Run  # noqa: E402

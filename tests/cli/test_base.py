@@ -10,9 +10,9 @@ import yaml
 import random_cases
 from harness import BERGTOW, CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, write_case
 
-from bergtow.study import case_file
-from bergtow.result.run import Run
 from bergtow.result import origins as report_case
+from bergtow.result.run import Run
+from bergtow.study import case_file
 
 SHORT = changed(TOW, run__duration=4, run__title="the base", output={"window_start": 2})
 NEARER = {"base": "sub/middle.yml", "run": {"title": "the nearest"}, "tow.speed": 0.2}

@@ -13,16 +13,15 @@ import made_up_ensemble as made_up
 from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
 from bergtow import cli
-from bergtow.study import analysis
-from bergtow.study import budget
-from bergtow.text import budget as budget_text
-from bergtow.result import compared
-from bergtow.stats import variance as stat_budget
-from bergtow.stats import load as stat_load
 from bergtow.errors import RunError
-from bergtow.result.run import Run
-from bergtow.writing import plain
+from bergtow.result import compared, findings
 from bergtow.result.members import Ensemble
+from bergtow.result.run import Run
+from bergtow.stats import load as stat_load
+from bergtow.stats import variance as stat_budget
+from bergtow.study import analysis, budget
+from bergtow.text import budget as budget_text
+from bergtow.writing import plain
 from test_loads import SERIES
 
 
@@ -392,7 +391,7 @@ def test_a_study_end_to_end(small):
     seconds = json.loads((member / "summary.json").read_text())["window"]
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
-    block = analysis.chapter("budget", analysis.read("budget", folder / "out"))
+    block = analysis.chapter("budget", findings.read("budget", folder / "out"))
     assert "\n\n| part |" in f"\n\n{block['markdown']}" and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}

@@ -11,12 +11,11 @@ from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
-from bergtow.study import analysis
-from bergtow.study import bracket
-from bergtow.study import capability
-from bergtow.text import capability as capability_text
-from bergtow.study import runs as case_runs
+from bergtow.result import findings
 from bergtow.result.run import Run
+from bergtow.study import analysis, bracket, capability
+from bergtow.study import runs as case_runs
+from bergtow.text import capability as capability_text
 
 THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
                  ice__concentration=0.5, ice__size=0.6, ice__friction=0.2, body__length=1, tow__mode="thrust",
@@ -396,7 +395,7 @@ class made_up_run(Told):
 
 
 def test_its_block_for_a_report(tmp_path):
-    assert analysis.read("capability", tmp_path) is None
+    assert findings.read("capability", tmp_path) is None
     point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 1, "speed": [0.4, 0.5], "mean_speed": 0.45,
              "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
              "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
@@ -409,21 +408,21 @@ def test_its_block_for_a_report(tmp_path):
              "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", analysis.read("capability", tmp_path))
+    block = analysis.chapter("capability", findings.read("capability", tmp_path))
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "| stood still | failed |" in block["markdown"] and "| 2 of 2 | – | 1 |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    said = analysis.chapter("capability", analysis.read("capability", tmp_path))["markdown"]
+    said = analysis.chapter("capability", findings.read("capability", tmp_path))["markdown"]
     assert "at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:
         row["estimate"] = None
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", analysis.read("capability", tmp_path))
+    block = analysis.chapter("capability", findings.read("capability", tmp_path))
     assert len(block["figure"]().axes) == 2  # no limit, no panel of it
     assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3

@@ -15,12 +15,12 @@ import made_up_ensemble as made_up
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
 from bergtow import cli
-from bergtow.study import runs as case_runs
-from bergtow.study import converge
-from bergtow.text import converge as converge_text
-from bergtow.result import integrity as soundness
 from bergtow.errors import RunError
+from bergtow.result import integrity as soundness
 from bergtow.result.run import Run
+from bergtow.study import converge
+from bergtow.study import runs as case_runs
+from bergtow.text import converge as converge_text
 
 
 @pytest.mark.parametrize("n", [4, 8, 32])

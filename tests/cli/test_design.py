@@ -16,18 +16,17 @@ from browser import browser, complaints, opened
 from harness import BERGTOW, TOW, call, changed, environment, script, write_case
 
 from bergtow import cli
-from bergtow.study import design
-from bergtow.study import domain_width
-from bergtow.text import loads as loads_text
-from bergtow.reporting import pdf
-from bergtow.result import origins as report_case
+from bergtow import table as text_table
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.reporting import design, pdf
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
-from bergtow.plot import style
-from bergtow.text import table as text_table
-from bergtow.errors import RunError
-from bergtow.result.run import Run
+from bergtow.result import origins as report_case
 from bergtow.result.members import Ensemble
+from bergtow.result.run import Run
+from bergtow.study import domain_width
+from bergtow.text import loads as loads_text
 
 TITLE = 'Tiny "berg" <i>A</i> & 50 %'
 CASE = changed(TOW, run={"dt": 0.1, "duration": 40, "title": TITLE}, output__window_start=8, domain__length=14,

@@ -17,6 +17,7 @@ from bergtow.plot import impacts as plot_impacts
 from bergtow.reporting import run as report_run
 from bergtow.result.run import Run as Folder
 
+pytestmark = pytest.mark.usefixtures("look")
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
 LINE = changed(TOW,
                tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},

@@ -14,21 +14,23 @@ import made_up_ensemble as made_up
 from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
-from bergtow.stats import conditions as ensemble
-from bergtow.text import ensemble as ensemble_text
-from bergtow.stats import loads
-from bergtow.text import loads as loads_text
-from bergtow.reporting import method as report_method
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import loads as plot_loads
+from bergtow.reporting import statistics
+from bergtow.reporting import method as report_method
+from bergtow.reporting.ensemble import OPTIONS
+from bergtow.result.members import Ensemble
+from bergtow.result.run import Run
+from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement_module
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.stats import design_value as statement_module
-from bergtow.result.run import Run
-from bergtow.result.members import Ensemble
-from bergtow.reporting.ensemble import OPTIONS
+from bergtow.text import ensemble as ensemble_text
+from bergtow.text import loads as loads_text
 
+pytestmark = pytest.mark.usefixtures("look")
 TRIALS = 14
 
 
@@ -637,7 +639,7 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
     thrust = s["conditions"][0]["loads"]["vessel_thrust"]
     assert "saturated at 1e+06 N" in thrust["over_threshold"]["refused"] and "value" not in thrust["design"]
     assert "saturated at 1e+06 N" in text and thrust["largest"] == pytest.approx(1e6)
-    ensemble.write(s, tmp_path, False)
+    statistics.write(s, tmp_path, False)
     e = Ensemble(tmp_path / "a")
     for name in ("tow_force", "vessel_thrust"):
         plot_ensemble.draw_above(e, s["conditions"], name)

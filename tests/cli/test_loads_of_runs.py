@@ -11,13 +11,13 @@ from scipy import stats
 
 from harness import TOW, call, changed, write_case
 
-from bergtow.stats import conditions as ensemble
-from bergtow.text import loads as loads_text
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
-from bergtow.stats import design_value as statement
 from bergtow.result.members import Ensemble
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement
+from bergtow.text import loads as loads_text
 
 N = 4
 VESSEL = changed(TOW, run={"dt": 0.05, "duration": 40}, domain={"length": 30, "width": 10},

@@ -17,8 +17,8 @@ from harness import NUMERIC, Run, area, changed, differing, quick, run, warned, 
 from resuming import done
 
 from bergtow.result import run as bergtow_read
-from bergtow.stats import loads
 from bergtow.result.members import Ensemble
+from bergtow.stats import loads
 
 A = 1.0
 TOWED = {

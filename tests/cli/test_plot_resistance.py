@@ -10,11 +10,12 @@ from scipy import stats
 from harness import DONE, call, changed, script, write_case
 from test_postproc import done, make_run, pixels, where
 
+from bergtow.errors import RunError
+from bergtow.plot import style
 from bergtow.plot import resistance as plot_resistance
 from bergtow.stats import drift as stat_drift
-from bergtow.plot import style
-from bergtow.errors import RunError
 
+pytestmark = pytest.mark.usefixtures("look")
 BERG = {
     "run": {"dt": 5, "duration": 1000},
     "domain": {"frame": "geographic", "length": 5000, "width": 2000, "ends": "wall", "sides": "wall"},

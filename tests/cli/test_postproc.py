@@ -13,15 +13,15 @@ from PIL import Image
 
 from harness import script
 
+pytestmark = pytest.mark.usefixtures("look")
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 
-from bergtow.result import run as bergtow_read
+from bergtow.errors import RunError
+from bergtow.plot import scene, style
 from bergtow.plot import field as plot_field
 from bergtow.plot import force as plot_force
 from bergtow.reporting import run as report_run
-from bergtow.plot import scene
-from bergtow.plot import style
-from bergtow.errors import RunError
+from bergtow.result import run as bergtow_read
 from bergtow.result.run import Run
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -334,6 +334,23 @@ def test_a_python_without_packages_is_a_message(command):
     assert said.stderr.count("\n") == 1 and "python3-numpy (Debian)" in said.stderr
 
 
+def test_modules_use_those_below_them():
+    """In the order of the table in docs/architecture.md. Red: result/ imports plot/; the table lacks a module."""
+    table = re.search(r"^## The Python package\n(.*?)^## ", (ROOT / "docs/architecture.md").read_text(), re.S | re.M)[1]
+    rows = re.findall(r"^\| ([\\\w, ]+) \| \S+ ", table, re.M)[1:]
+    rows = [re.findall(r"\w+", row.replace("\\", "")) for row in rows]
+    place = {name: -k for k, row in enumerate(rows) for name in row}
+    package = ROOT / "postproc/bergtow"
+    for file in sorted(package.rglob("*.py")):
+        own = file.relative_to(package).parts[0].removesuffix(".py")
+        if own in ("__init__", "__main__"):
+            continue
+        for module, names in re.findall(r"^from (?:bergtow)?\.?([\w.]*) import ([\w, ]+)", file.read_text(), re.M):
+            for used in [module.split(".")[0]] if module else [name.split()[0] for name in names.split(", ")]:
+                assert used not in place or place[used] <= place[own], (file, used)
+        assert own in place, file
+
+
 def test_the_program_and_the_package_have_the_same_commands():
     """Each command of the package in `bergtow --help`, in its words; the program's others reach it from Python."""
     listed = dict(re.findall(r"^  ([a-z-]+) +(\S.*)$", call("--help").stdout, re.M))

@@ -33,9 +33,10 @@ from bergtow.plot import force as plot_force
 from bergtow.plot import resistance as plot_resistance
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
-from bergtow.result.run import Run
 from bergtow.result.members import Ensemble
+from bergtow.result.run import Run
 
+pytestmark = pytest.mark.usefixtures("look")
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
 SPEED = changed(TOW, run__duration=12, output__window_start=4, tow__ramp=8)
 #: cases, and what each has of "with a ..." and "where ..."

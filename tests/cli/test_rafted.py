@@ -13,6 +13,7 @@ from bergtow.plot import field as plot_field  # noqa: E402
 from bergtow.result import overlaps as rafted  # noqa: E402
 from bergtow.result.run import Run as Reader  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("look")
 SQUARE = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
 PRESSED = changed(TOW,
                   domain={"length": 15, "width": 8, "ends_closing": 0.15},

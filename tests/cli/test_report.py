@@ -20,17 +20,16 @@ from harness import TOW, call, changed, run, texts, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 
-from bergtow import cli
+from bergtow import cli, writing
 from bergtow.errors import BergtowError
-from bergtow import writing
-from bergtow.result import overlaps as rafted
-from bergtow.reporting import replay as replay_data
-from bergtow.reporting import page as report
-from bergtow.result import origins as report_case
-from bergtow.reporting import run as report_run
-from bergtow.stats import design_value as statement
 from bergtow.plot import style
+from bergtow.reporting import page as report
+from bergtow.reporting import replay as replay_data
+from bergtow.reporting import run as report_run
+from bergtow.result import origins as report_case
+from bergtow.result import overlaps as rafted
 from bergtow.result.run import Run
+from bergtow.stats import design_value as statement
 
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
 OLD = f"an old page, {writing.MARK}"

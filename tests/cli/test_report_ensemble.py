@@ -16,15 +16,15 @@ from harness import TOW, call, changed, write_case
 from made_up_ensemble import FAILED, WAITING, member
 
 from bergtow import cli
-from bergtow.stats import conditions as ensemble
-from bergtow.text import loads as loads_text
-from bergtow.result import origins as report_case
+from bergtow.errors import RunError
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
-from bergtow.stats import variance as stat_budget
-from bergtow.errors import RunError
-from bergtow.writing import plain
+from bergtow.result import origins as report_case
 from bergtow.result.members import Ensemble
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import variance as stat_budget
+from bergtow.text import loads as loads_text
+from bergtow.writing import plain
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
 JAM = "the towed body stood still for 40 s of 600 s <i>: a jam"

@@ -15,15 +15,16 @@ import made_up_ensemble as made_up
 import script_copy
 from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 
-from bergtow.stats import conditions as ensemble
-from bergtow.stats import loads
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import force as plot_force
 from bergtow.reporting import ensemble as report_ensemble
-from bergtow.result.run import Run
-from bergtow.writing import plain as plain_data
 from bergtow.result.members import DOUBTS, Ensemble
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import conditions as ensemble
+from bergtow.writing import plain as plain_data
 
+pytestmark = pytest.mark.usefixtures("look")
 # Bridles that part in dense ice, short windows, and loose ice that a body hardly meets.
 CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=16, domain__width=6, ice__size=0.6,
                body__length=1, tow={"mode": "line", "speed": 0.15, "ramp": 5, "line_length": 2, "line_stiffness": 5000,

@@ -18,16 +18,17 @@ from harness import DONE, TOW, call, changed, run, script, write_case
 from test_postproc import done, pixels
 
 from bergtow import cli
-from bergtow.stats import conditions as ensemble
+from bergtow.errors import BergtowError, RunError
 from bergtow.plot import chains as plot_chains
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import sweep as plot_sweep
 from bergtow.result import integrity as soundness
-from bergtow.stats import mean as stat_mean
-from bergtow.errors import BergtowError, RunError
-from bergtow.result.run import Run
 from bergtow.result.members import Ensemble
+from bergtow.result.run import Run
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import mean as stat_mean
 
+pytestmark = pytest.mark.usefixtures("look")
 FIELDS, LENGTH = 8, 400
 
 

@@ -14,6 +14,7 @@ from bergtow import cli
 from bergtow.plot import variants as plot_variants
 from bergtow.result.members import Ensemble
 
+pytestmark = pytest.mark.usefixtures("look")
 BASE = {
     "run": {"title": "t", "dt": 0.1, "duration": 6}, "domain": {"length": 16, "width": 8},
     "ice": {"concentration": 0.3, "size": 1, "thickness": 0.1, "shape": "polygons"},

@@ -15,8 +15,9 @@ from bergtow._program import program_path
 #: {command: (module, what it does)}
 COMMANDS = {
     "report": ("reporting.page", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF"),
-    "design": ("study.design", "from a case or a study to the report of the design tow force, as a page and as PDF"),
-    "statistics": ("stats.conditions",
+    "design": ("reporting.design",
+               "from a case or a study to the report of the design tow force, as a page and as PDF"),
+    "statistics": ("reporting.statistics",
                    "statistics of an ensemble: design force, loads, intervals, in tables and files"),
     "converge": ("study.converge", "find out what of the computation a result depends on: width, length, time step, "
                  "tolerance, start"),

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""What the commands share: arguments, and messages and exit codes in place of tracebacks."""
+"""Messages and exit codes in place of tracebacks."""
 import argparse
 import os
 import signal
 import sys
-from pathlib import Path
 
 from bergtow.cli import lacking
 from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
-from bergtow.writing import may_write
 
 
 class Parser(argparse.ArgumentParser):
@@ -16,32 +14,6 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message):
         raise BergtowError(f"{message}; see {self.prog} --help", USAGE)
-
-
-def add_run(p, output):
-    """RUN, -o/--output (default: RUN/output) and --force."""
-    p.add_argument("run", metavar="RUN", help="output folder of a run")
-    p.add_argument("-o", "--output", metavar="FILE", type=Path, help=f"file to write (default: RUN/{output})")
-    add_force(p)
-
-
-def add_force(p):
-    p.add_argument("--force", action="store_true", help="replace a file that is there, whoever made it")
-
-
-def output(a, default, allowed):
-    """Path to write to. Errors: BergtowError when its name does not end in one of the allowed suffixes, and when
-    another's file is there: before any work is done."""
-    path = a.output or Path(a.run) / default
-    ends_in(path, allowed)
-    may_write(path, a.force)
-    return path
-
-
-def ends_in(path, allowed):
-    """Errors: BergtowError."""
-    if path.suffix.lower() not in allowed:
-        raise BergtowError(f"{path}: unknown kind of file; end the name in {', '.join(allowed)}", USAGE)
 
 
 class _Stream:

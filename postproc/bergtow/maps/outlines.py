@@ -12,14 +12,13 @@ import json
 import math
 from pathlib import Path
 
-from bergtow import writing
-from bergtow.cli import command
+from bergtow import arguments, writing
+from bergtow.errors import USAGE, BergtowError, RunError
 from bergtow.maps import doubts as map_doubts
 from bergtow.maps import plane as map_plane
 from bergtow.maps import read as map_read
 from bergtow.maps import repair as map_repair
 from bergtow.maps import text as map_text
-from bergtow.errors import USAGE, BergtowError, RunError
 
 import numpy as np
 
@@ -137,15 +136,15 @@ def options(p):
     p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
     p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
     p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
-    command.add_force(p)
+    arguments.add_force(p)
 
 def check_files(a):
     """Before any work: names, and whether they may be written."""
-    command.ends_in(a.output, (".geojson", ".json"))
+    arguments.ends_in(a.output, (".geojson", ".json"))
     if a.record:
-        command.ends_in(a.record, (".json",))
+        arguments.ends_in(a.record, (".json",))
     if a.picture:
-        command.ends_in(a.picture, writing.PICTURES)
+        arguments.ends_in(a.picture, writing.PICTURES)
     written = [f for f in (a.output, a.record, a.picture) if f]
     if len({f.resolve() for f in [a.map, *written]}) <= len(written):
         raise BergtowError("the map and the files to write need names of their own", USAGE)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A picture of a map and of what became of it: the outlines as they were read, the floes that were written."""
 from bergtow import writing
-from bergtow.plot import style
 from bergtow.maps.repair import parts_of
+from bergtow.plot import style
 
 import numpy as np
 from matplotlib.collections import PolyCollection

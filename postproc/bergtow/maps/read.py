@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bergtow.maps import stairs as map_stairs
 from bergtow.errors import RunError
+from bergtow.maps import stairs as map_stairs
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
 LOCAL = "urn:x-bergtow:crs:local-metres-east-north"  # src/field/map_crs.h

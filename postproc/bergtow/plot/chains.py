@@ -8,10 +8,9 @@ impulse / time step, the points of one pair of floes together.
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import RunError
+from bergtow.plot import style
 from bergtow.result.run import Run, place
 
 import h5py
@@ -206,10 +205,10 @@ def options(p):
     p.add_argument("--whole",
                    action="store_true",
                    help="draw the whole domain (default: what holds the towed body and the forces)")
-    command.add_force(p)
+    arguments.add_force(p)
 
 
 def perform(a):
-    path = command.output(a, "chains.png", writing.PICTURES)
+    path = arguments.output(a, "chains.png", writing.PICTURES)
     with Run(a.run) as run:
         writing.save(draw(run, read(a.contacts), a.whole), path, a.force)

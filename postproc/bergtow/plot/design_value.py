@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The design tow force of each condition with its interval, beside the mean and the largest that was simulated; and the
 line tension where there is a line."""
-from bergtow.stats import design_value as statement
 from bergtow.plot import style
 from bergtow.result.at_least import AtLeast
+from bergtow.stats import design_value as statement
 
 import numpy as np
 

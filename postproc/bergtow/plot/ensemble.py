@@ -14,18 +14,17 @@
 import sys
 from pathlib import Path
 
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.stats import loads
-from bergtow.plot import variants as plot_variants
-from bergtow.stats import mean as stat_mean
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import RunError
-from bergtow.stats.conditions import add_load_options, member, nothing_to_count, sensitivity
+from bergtow.plot import style
+from bergtow.plot import variants as plot_variants
 from bergtow.plot.axes import axis_label, headline, numeric, of, wants_log
-from bergtow.result.members import EXCLUDABLE, Ensemble, reading, short_key
 from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
+from bergtow.result.members import EXCLUDABLE, Ensemble, reading, short_key
+from bergtow.stats import loads
+from bergtow.stats import mean as stat_mean
+from bergtow.stats.conditions import member, nothing_to_count, sensitivity
 
 import numpy as np
 from matplotlib.colors import LogNorm
@@ -177,8 +176,8 @@ def options(p):
                    choices=EXCLUDABLE,
                    default=[],
                    help="leave out members with this doubt; may be repeated")
-    add_load_options(p)
-    command.add_force(p)
+    loads.add_load_options(p)
+    arguments.add_force(p)
 
 
 def perform(a):

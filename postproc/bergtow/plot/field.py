@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The ice field of a run before, during and after the tow, with the channel that the body leaves."""
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import USAGE, BergtowError, RunError
-from bergtow.result.run import Run
+from bergtow.plot import style
 from bergtow.plot.scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+from bergtow.result.run import Run
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -119,7 +118,7 @@ def draw(run, kind="speed", times=(), window="auto"):
 
 
 def options(p):
-    command.add_run(p, "field.png")
+    arguments.add_run(p, "field.png")
     p.add_argument("--colour",
                    "--color",
                    choices=COLOURS,
@@ -134,6 +133,6 @@ def options(p):
 def perform(a):
     if not np.isfinite(a.times).all():
         raise BergtowError("--times: not a finite number", USAGE)
-    path = command.output(a, "field.png", writing.PICTURES)
+    path = arguments.output(a, "field.png", writing.PICTURES)
     with Run(a.run) as run:
         writing.save(draw(run, a.colour, a.times, a.window), path, a.force)

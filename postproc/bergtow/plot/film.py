@@ -8,13 +8,12 @@ What stands still is drawn once; per frame only floes, bodies and the moving par
 import subprocess
 import tempfile
 
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import USAGE, BergtowError, RunError
-from bergtow.result.run import Run
-from bergtow.plot.force import draw_ice, smoothing, running_mean
+from bergtow.plot import style
+from bergtow.plot.force import draw_ice, running_mean, smoothing
 from bergtow.plot.scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+from bergtow.result.run import Run
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -183,7 +182,7 @@ def write_gif(film, frames, fps, path):
 
 
 def options(p):
-    command.add_run(p, "film.mp4")
+    arguments.add_run(p, "film.mp4")
     p.add_argument("--colour",
                    "--color",
                    choices=COLOURS,
@@ -200,7 +199,7 @@ def options(p):
 
 
 def perform(a):
-    path = command.output(a, "film.mp4", (".mp4", ".gif"))
+    path = arguments.output(a, "film.mp4", (".mp4", ".gif"))
     gif = path.suffix.lower() == ".gif"
     if not 0.1 <= a.fps <= 120:
         raise BergtowError("--fps: choose 0.1 to 120", USAGE)

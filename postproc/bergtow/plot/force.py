@@ -2,10 +2,9 @@
 """Forces of a run against time, with the mean over its window; on request, how the solver fared."""
 import textwrap
 
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.plot import style
 from bergtow.result.run import Run
 
 import numpy as np
@@ -250,7 +249,7 @@ def draw_diagnostics(run):
 
 
 def options(p):
-    command.add_run(p, "force.png")
+    arguments.add_run(p, "force.png")
     p.add_argument("--diagnostics", action="store_true",
                    help="also draw contacts, sweeps, residual and overlap, in a second file (NAME-diagnostics)")
     p.add_argument("--max", metavar="N", type=float, help="upper end of the force axes, N")
@@ -259,7 +258,7 @@ def options(p):
 def perform(a):
     if a.max is not None and not 0 < a.max < np.inf:
         raise BergtowError("--max: choose a force above 0", USAGE)
-    path = command.output(a, "force.png", writing.PICTURES)
+    path = arguments.output(a, "force.png", writing.PICTURES)
     second = path.with_name(f"{path.stem}-diagnostics{path.suffix}")
     if a.diagnostics:
         writing.may_write(second, a.force)

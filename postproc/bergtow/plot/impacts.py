@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Loads around the hull by panel, and how often the peak of a collision is exceeded."""
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.result import at_least
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result import at_least
 from bergtow.result.run import Run
 
 import numpy as np
@@ -172,10 +171,10 @@ def draw(run):
 
 
 def options(p):
-    command.add_run(p, "impacts.png")
+    arguments.add_run(p, "impacts.png")
 
 
 def perform(a):
-    path = command.output(a, "impacts.png", writing.PICTURES)
+    path = arguments.output(a, "impacts.png", writing.PICTURES)
     with Run(a.run) as run:
         writing.save(draw(run), path, a.force)

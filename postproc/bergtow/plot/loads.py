@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """How often a load, or the peak of a collision, is exceeded in the conditions of an ensemble: a line a condition."""
-from bergtow.stats import extreme as stat_extreme
 from bergtow.plot import style
-from bergtow.stats.conditions import extremes
 from bergtow.plot.axes import headline, wants_log
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats.conditions import extremes
 
 import numpy as np
 

@@ -9,15 +9,13 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.result import at_least
-from bergtow.result import compared
-from bergtow.stats import drift as stat_drift
-from bergtow.plot import style
+from bergtow import arguments, writing
 from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result import at_least, compared
 from bergtow.result.run import Run
-from bergtow.text.table import quantity, scale, short
+from bergtow.stats import drift as stat_drift
+from bergtow.table import quantity, scale, short
 
 import numpy as np
 
@@ -401,12 +399,12 @@ def options(p):
     p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
     p.add_argument("--words", action="store_true", help="also print the numbers as sentences")
-    command.add_force(p)
+    arguments.add_force(p)
 
 
 def perform(a):
     path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
-    command.ends_in(path, writing.PICTURES)
+    arguments.ends_in(path, writing.PICTURES)
     for place in filter(None, (path, a.table)):
         writing.may_write(place, a.force)
     points = once([read(run) for run in a.run])

@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
-from bergtow.result import overlaps as rafted
-from bergtow.plot import style
 from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result import overlaps as rafted
 from bergtow.result.run import place
 
 COLOURS = ("speed", "force", "thickness")

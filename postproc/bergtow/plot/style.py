@@ -7,7 +7,7 @@ contrast against the water, so that they also read in grey.
 import textwrap
 from contextlib import contextmanager
 
-from bergtow.text import table as text_table
+from bergtow import table as text_table
 
 import matplotlib
 import numpy as np

@@ -4,11 +4,11 @@ estimates beside the concentration, the law V^2 beside the speed. Of a Latin hyp
 """
 import textwrap
 
-from bergtow.stats import mean as stat_mean
 from bergtow.plot import style
-from bergtow.stats.conditions import sample
 from bergtow.plot.axes import axis_label, headline, of, wants_log
 from bergtow.result.members import reading, short_key, worded
+from bergtow.stats import mean as stat_mean
+from bergtow.stats.conditions import sample
 
 import numpy as np
 from matplotlib.lines import Line2D

@@ -9,9 +9,9 @@
 import numpy as np
 import scipy
 
-from bergtow.stats import mean as stat_mean
 from bergtow.plot import style
 from bergtow.result.members import worded
+from bergtow.stats import mean as stat_mean
 
 KEY = "variant"
 

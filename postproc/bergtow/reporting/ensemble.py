@@ -11,25 +11,25 @@ import sys
 from dataclasses import replace
 from itertools import groupby
 
-from bergtow.study import analysis
-from bergtow.result import compared
-from bergtow.stats import conditions as ensemble
-from bergtow.text import ensemble as ensemble_text
-from bergtow.stats import loads
-from bergtow.text import loads as loads_text
+from bergtow import table as text_table
+from bergtow.errors import RunError
+from bergtow.plot import style
 from bergtow.plot import design_value as plot_design
 from bergtow.plot import ensemble as plot_ensemble
-from bergtow.result import origins as report_case
 from bergtow.reporting import method as report_method
 from bergtow.reporting import run as report_run
-from bergtow.stats import fit as stat_fit
-from bergtow.stats import design_value as statement
-from bergtow.plot import style
-from bergtow.text import table as text_table
-from bergtow.errors import RunError
-from bergtow.result.run import Run
-from bergtow.result.origins import scrubbed
+from bergtow.result import compared, findings
+from bergtow.result import origins as report_case
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, Ensemble, reading, short_key
+from bergtow.result.origins import scrubbed
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement
+from bergtow.stats import fit as stat_fit
+from bergtow.study import analysis
+from bergtow.text import ensemble as ensemble_text
+from bergtow.text import loads as loads_text
 
 import numpy as np
 
@@ -330,7 +330,7 @@ def results_beside(e, also):
     texts, out = compared.cases(e), {}
     for name in analysis.KINDS:
         for folder in (e.path, *also):
-            found = analysis.read(name, folder)
+            found = findings.read(name, folder)
             if found is not None:
                 out[name] = found | {"doubt": doubt(name, found, folder, texts)}
                 break

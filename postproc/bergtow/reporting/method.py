@@ -3,15 +3,15 @@
 from what was simulated."""
 import numpy as np
 
-from bergtow.text import capability as capability_text
 from bergtow.result import compared
-from bergtow.text import loads as loads_text
+from bergtow.result.origins import source_of_ice
+from bergtow.result.run import case_value
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import profile as stat_profile
-from bergtow.result.run import case_value
-from bergtow.result.origins import source_of_ice
-from bergtow.text.table import number, quantity
+from bergtow.table import number, quantity
+from bergtow.text import capability as capability_text
+from bergtow.text import loads as loads_text
 
 KAPPA, PRESSURE = "ice.rafting.kappa", "ice.crushing.pressure"
 

@@ -10,16 +10,15 @@ import hashlib
 from datetime import datetime, timezone
 from pathlib import Path
 
-from bergtow.study import analysis
-from bergtow import writing
-from bergtow.cli import command
+from bergtow import arguments, writing
+from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.plot import vector
 from bergtow.reporting import pdf
 from bergtow.reporting import run as report_run
-from bergtow.plot import vector
-from bergtow.errors import USAGE, BergtowError, RunError
-from bergtow.result.run import Run
-from bergtow.result.origins import TITLE_BLOCK
 from bergtow.reporting.replay import LIMIT
+from bergtow.result.origins import TITLE_BLOCK
+from bergtow.result.run import Run
+from bergtow.study import analysis
 
 import jinja2
 
@@ -86,7 +85,7 @@ def render(template, context, paper=False):
 
 
 def options(p):
-    command.add_run(p, "report.html")
+    arguments.add_run(p, "report.html")
     p.add_argument(
         "--size",
         metavar="MB",
@@ -110,7 +109,7 @@ def options(p):
 def perform(a):
     if not 0.1 <= a.size <= 1000:
         raise BergtowError("--size: choose 0.1 to 1000 MB", USAGE)
-    path = command.output(a, "report.html", (".html", ".htm", ".pdf"))
+    path = arguments.output(a, "report.html", (".html", ".htm", ".pdf"))
     write(Path(a.run), [path], {name: getattr(a, name) for name in TITLE_BLOCK}, a.also, a.size, not a.no_compression,
           a.force)
 

@@ -16,8 +16,8 @@ import zlib
 
 import numpy as np
 
-from bergtow.plot import style
 from bergtow.errors import RunError
+from bergtow.plot import style
 from bergtow.plot.force import running_mean, smoothing
 from bergtow.plot.scene import Colouring, body_size, needs_window, tow_heading, tow_line, view_body
 

@@ -3,16 +3,15 @@
 import re
 from dataclasses import replace
 
+from bergtow.errors import RunError
+from bergtow.plot import style, vector
 from bergtow.plot import field as plot_field
 from bergtow.plot import force as plot_force
 from bergtow.plot import impacts as plot_impacts
 from bergtow.plot import resistance as plot_resistance
-from bergtow.result import origins as report_case
-from bergtow.plot import style
-from bergtow.plot import vector
-from bergtow.result.at_least import AtLeast
-from bergtow.errors import RunError
 from bergtow.reporting.replay import LIMIT, Replay
+from bergtow.result import origins as report_case
+from bergtow.result.at_least import AtLeast
 
 import numpy as np
 

@@ -10,8 +10,8 @@ import hashlib
 import numpy as np
 
 from bergtow.errors import RunError
-from bergtow.result.run import Run, case_value
 from bergtow.result.members import FINISHED
+from bergtow.result.run import Run, case_value
 
 #: {quantity of bergtow converge: the key that is its value}
 KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",

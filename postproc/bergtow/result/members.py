@@ -20,9 +20,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from bergtow.errors import RunError
 from bergtow.result import at_least
 from bergtow.result import integrity as soundness
-from bergtow.errors import RunError
 from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2

@@ -12,8 +12,8 @@ import subprocess
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
-from bergtow.errors import BergtowError
 from bergtow._program import program_path
+from bergtow.errors import BergtowError
 
 import numpy as np
 import yaml

@@ -11,16 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bergtow.errors import RunError
+from bergtow.result.members import short_key
+from bergtow.result.origins import source_of_ice
+from bergtow.result.origins import short as in_short
+from bergtow.result.run import Run
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
-from bergtow.errors import RunError
-from bergtow.result.run import Run
-from bergtow.result.members import short_key
-from bergtow.result.origins import short as in_short, source_of_ice
-from bergtow.text.table import hours_text, quantity, short
+from bergtow.table import hours_text, quantity, short
 
 LOCKS = 60          # body widths that ice asks for which locks as the body displaces it (src/case/arch.c)
 LONG = 2.0          # the tow of the statement / the tow simulated: beyond, a longer load than any simulated is meant

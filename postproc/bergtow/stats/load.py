@@ -22,9 +22,9 @@ signal, S at least.
 import numpy as np
 import scipy
 
+from bergtow.result.run import within
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import mean as stat_mean
-from bergtow.result.run import within
 
 QUANTILES = (5, 25, 50, 75, 95, 99)
 LEAST_SCALES = 5      # time scales that a window must hold to be of use

@@ -23,12 +23,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bergtow.arguments import above_zero, share
+from bergtow.errors import RunError
+from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.errors import RunError
-from bergtow.result.run import Run, least
-from bergtow.text.table import quantity
+from bergtow.table import quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -261,3 +262,21 @@ def panels(e, rows):
         "mean_of_largest_95": over(largest),
         "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360
     }
+
+
+def add_load_options(p):
+    """Options of the statistics of loads."""
+    p.add_argument("--time-scale",
+                   type=above_zero,
+                   metavar="S",
+                   help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
+                        "scale: stats/loads.py says why)")
+    p.add_argument("--tow-hours",
+                   type=above_zero,
+                   metavar="H",
+                   help="length of the tow that the design values are for, h (default: 24 at full scale)")
+    p.add_argument("--probability",
+                   type=share,
+                   default=PROBABILITY,
+                   metavar="P",
+                   help="with which the design value is exceeded in such a tow (default %(default)s)")

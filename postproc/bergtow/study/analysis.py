@@ -5,17 +5,14 @@ NAME.png where something can be drawn, a text at the terminal, and a chapter of 
 The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
 `found` as it comes back from the file, where what is not finite is None.
 """
-import json
 import os
-from pathlib import Path
 
-from bergtow import writing
-from bergtow.cli import command
+from bergtow import arguments, writing
+from bergtow.arguments import above_zero
+from bergtow.errors import RunError
 from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
 from bergtow.text import converge as converge_text
-from bergtow.errors import RunError
-from bergtow.cli.kinds import above_zero
 
 #: heading and words, in the order of a report
 KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty budget", budget_text),
@@ -32,7 +29,7 @@ def add_options(p, minutes):
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=_jobs, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")
-    command.add_force(p)
+    arguments.add_force(p)
 
 
 def _jobs(text):
@@ -72,16 +69,6 @@ def also(folders):
         if not any((folder / f"{name}.json").is_file() for name in KINDS):
             raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
                            "name the folder of bergtow converge, budget or capability with --also")
-
-
-def read(name, place):
-    """What a command left in a folder, or in a file of another name; None where there is nothing, or it cannot be
-    read."""
-    path = Path(place)
-    try:
-        return json.loads((path if path.is_file() else path / f"{name}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
 
 
 def chapter(name, found):

@@ -12,16 +12,16 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from bergtow.study import analysis
-from bergtow.result import compared
-from bergtow.stats import loads
-from bergtow.stats import variance as stat_budget
-from bergtow.stats import load as stat_load
-from bergtow.errors import CASE, SIGNAL, USAGE, RunError
 from bergtow._program import program_path
-from bergtow.study.runs import run_members
+from bergtow.errors import CASE, SIGNAL, USAGE, RunError
+from bergtow.result import compared, findings
 from bergtow.result.members import FAILED, FINISHED, WAITING, Ensemble, listed
-from bergtow.text.table import hours_text
+from bergtow.stats import loads
+from bergtow.stats import load as stat_load
+from bergtow.stats import variance as stat_budget
+from bergtow.study import analysis
+from bergtow.study.runs import run_members
+from bergtow.table import hours_text
 
 import h5py
 import numpy as np
@@ -174,8 +174,8 @@ def of_all(e, some, converge):
 
 def read_converge(path, folder):
     if path is None:
-        return analysis.read("converge", folder)
-    found = analysis.read("converge", path)
+        return findings.read("converge", folder)
+    found = findings.read("converge", path)
     if not isinstance(found, dict) or "rows" not in found:
         raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
     return found

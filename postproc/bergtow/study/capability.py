@@ -21,18 +21,14 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bergtow.study import analysis
-from bergtow.result import at_least
-from bergtow.study import bracket
-from bergtow.result import compared
-from bergtow.study import domain_width
-from bergtow.stats import mean as stat_mean
-from bergtow.study import units
-from bergtow.errors import CASE, USAGE, BergtowError, RunError
-from bergtow.result.run import Run, case_value, parse_case, within
-from bergtow.study.case_file import files, section
 from bergtow._program import program_path
-from bergtow.cli.kinds import above_zero, whole_from
+from bergtow.arguments import above_zero, whole_from
+from bergtow.errors import CASE, USAGE, BergtowError, RunError
+from bergtow.result import at_least, compared
+from bergtow.result.run import Run, case_value, parse_case, within
+from bergtow.stats import mean as stat_mean
+from bergtow.study import analysis, bracket, domain_width, units
+from bergtow.study.case_file import files, section
 from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 
 import numpy as np

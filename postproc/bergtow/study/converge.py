@@ -29,14 +29,14 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow.study import analysis
-from bergtow.stats import mean as stat_mean
-from bergtow.errors import SIGNAL, USAGE, RunError
-from bergtow.result.run import Run, within
 from bergtow._program import program_path
-from bergtow.cli.kinds import above_zero, whole_from
-from bergtow.study.runs import SPENT, CaseRuns, checked, locked
+from bergtow.arguments import above_zero, whole_from
+from bergtow.errors import SIGNAL, USAGE, RunError
 from bergtow.result.origins import BESIDE, annotated
+from bergtow.result.run import Run, within
+from bergtow.stats import mean as stat_mean
+from bergtow.study import analysis
+from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 
 import numpy as np
 import scipy

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bergtow._program import program_path
 from bergtow._calls import Calls
-from bergtow.errors import IO, OK, BergtowError
+from bergtow._program import program_path
 from bergtow.case import setting
-from bergtow.study.workers import on_workers
+from bergtow.errors import IO, OK, BergtowError
 from bergtow.functions import Picture, plot_ensemble, report, statistics
 from bergtow.result.dataset import Result, _imported, _text, _wrapper
+from bergtow.study.workers import on_workers
 
 if TYPE_CHECKING:
     import h5py

@@ -27,8 +27,8 @@ from pathlib import Path
 
 from bergtow._calls import Calls
 from bergtow._interrupts import held
-from bergtow.result import integrity as soundness
 from bergtow.errors import CASE, IO, USAGE, Refused, RunError
+from bergtow.result import integrity as soundness
 from bergtow.result.run import Run
 from bergtow.study.case_file import files
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The uncertainty budget of bergtow budget as one table and one picture."""
-from bergtow.text.converge import percent
 from bergtow.result.members import listed
-from bergtow.text.table import number, quantity, scale, table
+from bergtow.table import number, quantity, scale, table
+from bergtow.text.converge import percent
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What bergtow capability found, as tables and as a picture."""
 from bergtow.result.members import reading
-from bergtow.text.table import number, quantity, scale, short, table
+from bergtow.table import number, quantity, scale, short, table
 
 import numpy as np
 

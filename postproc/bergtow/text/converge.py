@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The verdicts of bergtow converge, a line each, or as a table of the report."""
-from bergtow.text.table import number, table
+from bergtow.table import number, table
 
 WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
 

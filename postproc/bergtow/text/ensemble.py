@@ -2,10 +2,10 @@
 """The statistics of an ensemble as tables of text or Markdown."""
 import numpy as np
 
+from bergtow.result.members import listed
+from bergtow.table import FAR, number, pair, scale, table
 from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
-from bergtow.result.members import listed
-from bergtow.text.table import FAR, number, pair, scale, table
 
 DOUBT_LETTERS = {"unconverged": "U", "unbounded": "B", "jammed": "J", "unsteady": "N", "short": "S", "few": "F",
                  "stopped": "X", "other": "O"}

@@ -4,10 +4,10 @@ from itertools import zip_longest
 
 import numpy as np
 
-from bergtow.stats import load as stat_load
-from bergtow.text import table as text_table
+from bergtow import table as text_table
 from bergtow.result.members import worded
-from bergtow.text.table import hours_text, number, pair, quantity, scale, table
+from bergtow.stats import load as stat_load
+from bergtow.table import hours_text, number, pair, quantity, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %

@@ -23,21 +23,19 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow.study import analysis
-from bergtow import writing
-from bergtow.cli import command
-from bergtow.study import domain_width
+from bergtow import arguments, writing
+from bergtow._program import program_path
+from bergtow.arguments import above_zero, at_least_one
+from bergtow.errors import SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
-from bergtow.errors import SIGNAL, RunError
-from bergtow.result.run import Run
-from bergtow.study.case_file import contents, files, is_study, says, section
-from bergtow._program import program_path
-from bergtow.cli.kinds import above_zero, at_least_one
-from bergtow.study.runs import checked, run_members
-from bergtow.study.domain_width import read_ice_of, reads_ice
 from bergtow.result.members import FINISHED, WAITING, Ensemble
 from bergtow.result.origins import TITLE_BLOCK
+from bergtow.result.run import Run
+from bergtow.study import analysis, domain_width
+from bergtow.study.case_file import contents, files, is_study, says, section
+from bergtow.study.domain_width import read_ice_of, reads_ice
+from bergtow.study.runs import checked, run_members
 
 import numpy as np
 import yaml
@@ -256,7 +254,7 @@ def options(p):
     p.add_argument("--quiet", action="store_true", help="no line for each member")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
-    command.add_force(p)
+    arguments.add_force(p)
 
 
 def perform(a):
