@@ -89,7 +89,7 @@ EXTENDED := $(BUILD)/tests/examples/extended
         validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
-all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
+all: $(BUILD)/bergtow $(BUILD)/libbergtow.so ## build build/release/bergtow and the library that Python loads (CONFIG=debug, ... for others)
 
 lib: $(BUILD)/libbergtow.a $(BUILD)/libbergtow.so ## the library: static, and shared for programs and Python
 

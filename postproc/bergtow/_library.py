@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import functools
+import json
 import os
 import threading
 from collections.abc import Callable
@@ -46,6 +47,12 @@ class Applied(ctypes.Structure):
                 ("air", c_double * 2), ("towed", c_int64)]
 
 
+class Mean(ctypes.Structure):
+    """bt_mean: of a correlated series, evenly spaced; its 95 % interval, correlation time and independent samples."""
+    _fields_ = [("mean", c_double), ("sd", c_double), ("se", c_double), ("low", c_double), ("high", c_double),
+                ("tau", c_double), ("n_eff", c_double), ("n", c_int64)]
+
+
 class Status(c_int):
     """bt_status of a call: what is not OK is raised, with what the library says of it."""
 
@@ -77,7 +84,10 @@ _SIGNATURES = {
     "bt_simulation_progress": (c_void_p, c_void_p),
     "bt_simulation_case": (c_void_p, c_void_p),
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
-    "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p)),
+    "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p), POINTER(c_void_p)),
+    "bt_file_holds": (c_char_p, c_char_p),
+    "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
+    "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),
@@ -200,6 +210,17 @@ def take_text(address: int | None) -> str:
     text = ctypes.string_at(address).decode()
     library().bt_release(address)
     return text
+
+
+@functools.cache
+def listed(what: str) -> dict[str, Any]:
+    """bt_list_json: "keys", "quantities" or "limits"."""
+    return json.loads(take_text(library().bt_list_json(what.encode())))
+
+
+def limit(name: str) -> Any:
+    """A number by which the program judges windows, domains and maps."""
+    return listed("limits")[name]
 
 
 def id_of_towed(towed: int | None) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from . import _library
 from ._interrupts import held
-from .errors import BergtowError
+from .errors import SIGNAL, BergtowError
 from .case import Case, here
 from .force import Force, Forces
 from .result.dataset import Result
@@ -171,7 +171,7 @@ class Simulation:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
         if self._address is None:
             return
-        if kind is None or getattr(error, "status", None) == _library.SIGNAL:  # asked to stop: nothing is lost
+        if kind is None or getattr(error, "status", None) == SIGNAL:  # asked to stop: nothing is lost
             self.end()
         else:
             self.drop()

@@ -40,6 +40,45 @@ char *bt_case_resolved(const bt_case *c)
     return bt_case_text(c, BT_CASE_RESOLVED_HEAD);
 }
 
+static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
+{
+    const char *member = (const char *)c + k->offset;
+    switch (k->type) {
+    case BT_KEY_REAL: bt_json_number(j, k->name, *(const double *)member); break;
+    case BT_KEY_INT: bt_json_int(j, k->name, *(const int64_t *)member); break;
+    case BT_KEY_BOOL: bt_json_bool(j, k->name, *(const bool *)member); break;
+    case BT_KEY_CHOICE: bt_json_string(j, k->name, k->choices[*(const unsigned *)member]); break;
+    case BT_KEY_TEXT: bt_json_string(j, k->name, *(char *const *)member); break;
+    case BT_KEY_MAP: break;
+    case BT_KEY_POINTS: {
+        const double *p = *(double *const *)member;
+        const int n = *(const int *)((const char *)c + k->offset_count);
+        if (!n) {
+            bt_json_raw(j, k->name, "null");
+            break;
+        }
+        bt_json_open(j, k->name, '[');
+        for (int i = 0; i < n; i++) {
+            bt_json_open(j, NULL, '[');
+            bt_json_number(j, NULL, p[2 * i]);
+            bt_json_number(j, NULL, p[2 * i + 1]);
+            bt_json_close(j, ']');
+        }
+        bt_json_close(j, ']');
+    }
+    }
+}
+
+char *bt_case_resolved_json(const bt_case *c)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    const int n = bt_n_case_keys - bt_schema_added() + c->n_extra;
+    for (int k = 0; k < n; k++) json_value(&j, &bt_case_keys[k], c);
+    bt_json_close(&j, '}');
+    return j.text;
+}
+
 char *bt_case_text(const bt_case *c, const char *head)
 {
     bt_text text;

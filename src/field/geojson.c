@@ -38,7 +38,6 @@
 #include "field/map_place.h"
 #include "base/suggest.h"
 
-static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
 static const double DEGREE = BT_PI / 180;
 
 /// What the coordinates of a file are.
@@ -270,8 +269,8 @@ static const char *place(const reader *s, int n, double *v)
         double north, east, swapped_north, swapped_east;
         bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, s->lon0, s->lat0, &north, &east);
         bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, s->lon0, s->lat0, &swapped_north, &swapped_east);
-        if (!(bt_hypot(north, east) <= FARTHEST)) {
-            if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= FARTHEST)
+        if (!(bt_hypot(north, east) <= BT_MAP_FARTHEST)) {
+            if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= BT_MAP_FARTHEST)
                 return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
                        "[longitude, latitude]";
             return s->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "

@@ -21,7 +21,8 @@ from bergtow.result import at_least  # noqa: E402
 from bergtow.study import budget  # noqa: E402
 from bergtow.study import capability  # noqa: E402
 from bergtow import writing  # noqa: E402
-from bergtow.stats import conditions as ensemble  # noqa: E402
+from bergtow.stats import conditions as ensemble
+from bergtow.text import ensemble as ensemble_text  # noqa: E402
 import made_up_ensemble as made_up  # noqa: E402
 from bergtow.plot import resistance as plot_resistance  # noqa: E402
 from bergtow.reporting import run as report_run  # noqa: E402
@@ -172,7 +173,7 @@ def test_tows_that_ended_for_want_of_a_solution_bound_nothing(tmp_path):
     assert c["without_bound"]["ended"] == ["c001-r007"] and c["without_bound"]["some"] == []
     assert "1 of 7 tows ended for want of a solution" in c["without_bound"]["words"]
     assert isinstance(c["resistance"]["mean"], AtLeast) and np.isnan(c["resistance"]["t_95"]).all()
-    text = ensemble.ensemble_text.report(s)
+    text = ensemble_text.report(s)
     assert f"at least {text_table.number(float(c['resistance']['mean']))}" in text and "c001-r007" in text
     other = statistics(made(tmp_path / "b", [field(k) for k in range(6)] + [failed("step 3: the world ended")]))
     assert other["conditions"][0]["without_bound"]["words"] == ""

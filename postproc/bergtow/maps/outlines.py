@@ -12,7 +12,7 @@ import json
 import math
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import _library, arguments, writing
 from bergtow.errors import USAGE, BergtowError, RunError
 from bergtow.maps import doubts as map_doubts
 from bergtow.maps import plane as map_plane
@@ -157,7 +157,7 @@ def in_plane(found, plane):
     bend = 0.0
     for shape in found.shapes:
         there = moved(shape.geometry, plane.onto)
-        if there.distance(map_repair.Point(0, 0)) < map_plane.FARTHEST:  # others are not for this plane
+        if there.distance(map_repair.Point(0, 0)) < _library.limit("map_farthest_m"):  # others are not for this plane
             bend = max(bend, bent(shape.geometry, plane))
         shape.geometry = there
         if shape.pixels is not None:
@@ -268,7 +268,7 @@ def perform(a):
         print("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
     distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
-    if distortion["farthest_m"] > map_plane.FARTHEST:
+    if distortion["farthest_m"] > _library.limit("map_farthest_m"):
         far = distortion["farthest_m"] / 1e3
         raise RunError(found.path, f"has floes {far:.4g} km from the centre; bergtow takes 100 km",
                        "choose a part with --box or --where, or set --centre")

@@ -25,7 +25,6 @@ import numpy as np
 from bergtow.errors import RunError
 from bergtow.maps.read import INSTALL, LOCAL
 
-FARTHEST = 100e3      # m from the centre: src/field/geojson.c
 WGS84 = "OGC:CRS84"   # degrees, longitude first
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
       "east and north of no place on the earth"

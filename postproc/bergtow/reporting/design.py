@@ -259,7 +259,8 @@ def options(p):
 
 def perform(a):
     a.output, began = a.output or Path("out") / f"design-{a.file.stem}", time.monotonic()
-    study = is_study(program_path(), contents(a.file))
+    contents(a.file)  # there, and what can be read
+    study = is_study(a.file)
     if a.budget is None and not study:
         a.budget = BUDGET
     if not a.no_pdf:

@@ -20,14 +20,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result import at_least
 from bergtow.result import integrity as soundness
 from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
-# samples, and stretches of contact, below which the program itself calls a window too short
-MIN_INDEPENDENT, MIN_STRETCHES = 20, 10
 #: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean, since
 #: what comes shortly before that is the largest of all
 LEAST_TOW = 150.0
@@ -47,9 +46,6 @@ DOUBTS = {
 
 #: codes of warnings that tell of one of these; what a verdict rests on are reasons, and no warnings of their own
 TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
-
-#: /summary/window_verdict
-STEADY, NOT_STEADY, TOO_SHORT = 0, 1, 2
 
 #: doubts by which members may be left out: not that they met little ice, which would leave out the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
@@ -326,17 +322,20 @@ class Ensemble:
 
     @cached_property
     def _doubts(self):
+        verdicts, independent_least, stretches_least = (_library.limit(name) for name in (
+            "verdicts", "window_independent", "window_contact_stretches"))
         out = {}
         for m in np.flatnonzero(self.status == FINISHED):
             codes = {warning["code"] for warning in self.warnings(m)}
             verdict, independent = (self.number(key, m) for key in ("window_verdict", "window_n_independent"))
-            short = verdict == TOO_SHORT or (np.isnan(verdict) and not independent >= MIN_INDEPENDENT)
-            few = self.number("window_n_contact_stretches", m) < MIN_STRETCHES
+            short = verdict == verdicts.index("too short") or (np.isnan(verdict)
+                                                                and not independent >= independent_least)
+            few = self.number("window_n_contact_stretches", m) < stretches_least
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0,
                 "unbounded": self.number("window_no_load_share", m) > 0,
                 "jammed": self.number("stalled_windows", m) > 0,
-                "unsteady": verdict == NOT_STEADY, "short": short and not few, "few": few,
+                "unsteady": verdict == verdicts.index("not steady"), "short": short and not few, "few": few,
                 "stopped": "stopped" in codes, "other": bool(codes - TOLD)
             }
             out[int(m)] = {kind for kind, there in checks.items() if there}

@@ -24,7 +24,7 @@ def member(e, m):
     """Mean of one member with its standard error within the run."""
     within = stat_mean.series_mean(e.steady(m))
     mean, independent = e.mean[m], e.number("window_n_independent", m)
-    low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
+    low, high = within.low, within.high
     se, share = within.se, e.number("window_no_load_share", m)
     if share > 0:
         mean, se, low, high = at_least.AtLeast(mean, share), np.nan, np.nan, np.nan
@@ -32,7 +32,7 @@ def member(e, m):
         "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
         "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
         "independent": independent if np.isfinite(independent) else within.n_eff,
-        "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
+        "tau_samples": within.tau, "doubts": sorted(e.doubts(m))
     }
 
 

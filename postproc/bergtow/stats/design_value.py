@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result.members import short_key
 from bergtow.result.origins import source_of_ice
@@ -23,7 +24,6 @@ from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
 from bergtow.table import hours_text, quantity, short
 
-LOCKS = 60          # body widths that ice asks for which locks as the body displaces it (src/case/arch.c)
 LONG = 2.0          # the tow of the statement / the tow simulated: beyond, a longer load than any simulated is meant
 FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
 WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
@@ -182,7 +182,8 @@ def _of_the_sample(e, rows, c, load):
         return out + [("no value", d["refused"])]
     out += _of_unlike_fields(load)
     hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
-    if hours > LONG * simulated > 0 and np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0) >= LOCKS:
+    if hours > LONG * simulated > 0 and np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0) >= _library.limit(
+            "locking_body_widths"):
         out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
                     "for tows of the length simulated, one after the other",
                     f"{hours_text(hours)} against {hours_text(simulated)}"))

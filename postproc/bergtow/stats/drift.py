@@ -4,10 +4,11 @@ may not tell from its noise: the mean of the changes, with Student's t over the 
 
 Without scipy, which `make demo` does not install.
 """
+from bergtow import _library
+
 import numpy as np
 
-LEAST = 5        # fields
-MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/output/steady.h
+LEAST = 5  # fields
 
 
 def student(freedom, level=0.95):
@@ -35,5 +36,5 @@ def of(changes, mean):
     changes = changes[np.isfinite(changes)]
     if len(changes) < LEAST:
         return None
-    low, high = interval(changes)
-    return changes.mean(), (low, high), bool((low > 0 or high < 0) and abs(changes.mean()) > MATERIAL * abs(mean))
+    (low, high), matters = interval(changes), _library.limit("window_drift") * abs(mean)
+    return changes.mean(), (low, high), bool((low > 0 or high < 0) and abs(changes.mean()) > matters)

@@ -1,24 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The interval is that of the program (src/base/stats.c, which says why): the mean square of the slowest
-cosine waves that the series holds, two or three, the larger, is n var(mean), and Student's t has 3 degrees of freedom
-[after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
-autoregression through batch means.
+Within a run. The library's own (bergtow/stats.h, src/base/stats.c): that of the program.
 
 Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense
 ice are skewed; the studentised bootstrap follows the skewness (second-order correct), where the percentile and BCa
 bootstrap are too short for few fields.
 """
-from dataclasses import dataclass
+from ctypes import POINTER, c_double
+
+from bergtow import _library
 
 import numpy as np
 import scipy
 
-BATCHES = 96         # as in src/base/stats.c, and the next three
-WAVES = (2, 3)
-FREEDOM = 3.0
-LEAST_CORRELATED = 12
 LEVEL = 0.95
 RESAMPLES = 1999
 LEAST_BOOTSTRAP = 5  # fields: fewer have too few different resamples
@@ -26,60 +21,11 @@ TRIM = 0.125         # share of the fields cut off at each end: one of eight, tw
 SEED = 20171         # of every resampling: the same files give the same table
 
 
-@dataclass(frozen=True)
-class SeriesMean:
-    """Mean of a correlated series."""
-
-    mean: float
-    sd: float     #: of the samples
-    se: float     #: of the mean
-    tau: float    #: correlation time in samples, 1/2 for white noise, no less
-    n_eff: float  #: independent samples, n / (2 tau)
-    dof: float    #: degrees of freedom of the interval
-    n: int
-
-    def interval(self, level=LEVEL):
-        """(low, high) with the t quantile of dof."""
-        half = scipy.stats.t.ppf(0.5 + level / 2, self.dof) * self.se if self.se > 0 else self.se
-        return self.mean - half, self.mean + half
-
-
-def batches(d):
-    """(means of the batches of d, their edges): at most BATCHES, of one length but for one sample."""
-    n = len(d)
-    count = min(n, BATCHES)
-    edges = n * np.arange(count + 1) // count
-    return np.add.reduceat(d, edges[:-1]) / np.diff(edges), edges
-
-
-def slow_variance(z, edges, waves):
-    """Mean square of the coefficients of the slowest waves of a series in batches z: n var(mean)."""
-    n = edges[-1]
-    phase = np.pi * np.outer(np.arange(1, waves + 1), edges[:-1] + edges[1:]) / (2 * n)
-    return np.mean((np.cos(phase) @ (np.diff(edges) * z)) ** 2) * 2 / n
-
-
-def batch_variance(z):
-    """Variance of a batch mean with the correlation between batches, from their deviations z."""
-    many = len(z) >= LEAST_CORRELATED and np.any(z)
-    phi = np.sum(z[:-1] * z[1:]) / np.sum(z * z) if many else 0.0
-    return np.sum(z * z) / (len(z) - 1 - many) * (1 + phi) / (1 - phi)
-
-
 def series_mean(x):
-    """SeriesMean of an evenly spaced series; NaNs where there are fewer than two samples or one is not finite."""
-    x = np.asarray(x, dtype=float)
-    n = len(x)
-    if n < 2 or not np.isfinite(x).all():
-        return SeriesMean(x.mean() if n else np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, n)
-    if np.ptp(x) == 0:
-        return SeriesMean(x[0], 0.0, 0.0, 0.5, float(n), n - 1.0, n)
-    d = x - x.mean()
-    sd = np.sqrt(np.sum(d * d) / (n - 1))
-    z, edges = batches(d)
-    variance = max(*(slow_variance(z, edges, min(len(z) - 1, waves)) / n for waves in WAVES), (sd / n) ** 2)
-    tau = max(0.5, n * batch_variance(z) / len(z) / (2 * sd * sd))
-    return SeriesMean(x.mean(), sd, np.sqrt(variance), tau, n / (2 * tau), FREEDOM, n)
+    """Mean of the library of an evenly spaced series: mean, sd, se, low and high, the ends of its 95 % interval, tau,
+    n_eff, n; NaNs where there are fewer than two samples or one is not finite."""
+    x = np.ascontiguousarray(x, dtype=float)
+    return _library.library().bt_stats_mean(x.ctypes.data_as(POINTER(c_double)), len(x))
 
 
 def t_interval(x, level=LEVEL):

@@ -16,18 +16,20 @@ tried is a part of the curve, and the rest of the curve is run with CURVE fields
 periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
 """
 import argparse
+import ctypes
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bergtow import _library
 from bergtow._program import program_path
 from bergtow.arguments import above_zero, whole_from
 from bergtow.errors import CASE, USAGE, BergtowError, RunError
 from bergtow.result import at_least, compared
 from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
-from bergtow.study import analysis, bracket, domain_width, units
+from bergtow.study import analysis, bracket, domain_width
 from bergtow.study.case_file import files, section
 from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 
@@ -324,6 +326,16 @@ def options(p):
     analysis.add_options(p, BUDGET)
 
 
+def number(option, text, unit):
+    """A number of an option with a unit, read as the program reads it. Errors: RunError."""
+    value = ctypes.c_double()
+    try:
+        _library.library().bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+    except BergtowError as error:
+        raise BergtowError(f"{option} {error}", USAGE) from None
+    return value.value
+
+
 def check_options(a):
     for name, k in (("start", 0), ("end", 1)):
         if getattr(a, name) is None:
@@ -350,12 +362,12 @@ def perform(a):
     unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
     resolution = abs(end - start) / PARTS
     if a.resolution:
-        resolution = units.number(binary, "--resolution", a.resolution, unit)
+        resolution = number("--resolution", a.resolution, unit)
         if not 0 < resolution <= abs(end - start):
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
                            f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
     if a.speed:
-        least = units.number(binary, "--speed", a.speed, "m/s")
+        least = number("--speed", a.speed, "m/s")
         if not least > 0:
             raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep", USAGE)
     last = began + 60 * a.budget

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The files of a case as YAML: its own and those that it is based on. What they mean is for the program to say."""
-import json
-import subprocess
+import os
 
 import yaml
 
-from bergtow.errors import RunError
-
-BAD_CASE = 3  # exit code of the program
+from bergtow import _library
+from bergtow.errors import CASE, RunError
 
 
 def contents(path):
@@ -16,9 +14,9 @@ def contents(path):
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file",
-                       4 if isinstance(error, OSError) else BAD_CASE) from None
+                       4 if isinstance(error, OSError) else CASE) from None
     if not isinstance(found, dict):
-        raise RunError(path, "is neither a case nor a study", "name a case or a study file", BAD_CASE)
+        raise RunError(path, "is neither a case nor a study", "name a case or a study file", CASE)
     return found
 
 
@@ -33,15 +31,9 @@ def files(path):
     return found
 
 
-def is_study(binary, found):
-    """Is this a study, and not a case with a base? As src/case/case_base.h has it."""
-    if "base" not in found:
-        return False
-    table = json.loads(subprocess.run([str(binary), "--list-keys", "--json"], capture_output=True, text=True).stdout)
-    sections = {key["name"].split(".")[0] for key in table["keys"]} - {"report"} | {"floes"}
-    words = set(map(str, found)) - {"base", "report"}
-    return bool(words & {key["name"] for key in table["study_keys"]}) or not any(
-        word.split(".")[0] in sections for word in words)
+def is_study(path):
+    """Is this the file of a study, and not of a case?"""
+    return _library.library().bt_file_holds(os.fsencode(path)) == b"study"
 
 
 def section(layers, name):
