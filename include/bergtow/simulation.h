@@ -180,6 +180,18 @@ bt_status bt_number_read(const char *text, const char *unit, double *value);
 /// the program judges windows, domains and maps. NULL for another word. Release with bt_release.
 char *bt_list_json(const char *what);
 
+/// Are the bytes of a sealed file those that were written? kind: "result", "ensemble", "field" or "checkpoint". Errors:
+/// BT_ERR_CASE, it is damaged, or no such file of this version; BT_ERR_IO; BT_ERR_USAGE, another kind.
+bt_status bt_seal_check(const char *path, const char *kind);
+
+/// The record of a run that has just ended in a folder: what its files are. name, and n bytes of what it was made by:
+/// whose it is. Errors: BT_ERR_IO, also where the files are not what a whole run leaves.
+bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n);
+
+/// Are the files of the folder those of its record, and is that of this name and bytes? Errors: BT_ERR_CASE, they are
+/// missing or changed; BT_ERR_IO.
+bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n);
+
 /// Release a text that one of these has given. NULL is ignored.
 void bt_release(char *text);
 

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/json.h"
 #include "base/largest.h"
@@ -22,6 +23,7 @@
 #include "output/folder.h"
 #include "output/quantity_list.h"
 #include "output/steady.h"
+#include "run/ensemble_record.h"
 #include "run/run_parts.h"
 #include "space/cells.h"
 #include "step/edit.h"
@@ -500,6 +502,43 @@ bt_status bt_number_read(const char *text, const char *unit, double *value)
     if (kind == BT_UNIT_KINDS) bt_errors_add(&err, "%s: no SI unit of a key; see bergtow --list-keys", unit);
     else if (!bt_units_parse(text, kind, value, why)) bt_errors_add(&err, "%s: %s", text, why);
     return reported(err.n ? BT_ERR_USAGE : BT_OK, &err);
+}
+
+bt_status bt_seal_check(const char *path, const char *kind)
+{
+    static const char *const kinds[] = {BT_CHECKSUM_CHECKPOINT, BT_CHECKSUM_RESULT, BT_CHECKSUM_FIELD,
+                                        BT_CHECKSUM_ENSEMBLE};
+    const size_t n = strlen(kind);
+    bt_errors err = {0};
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+        if (!strncmp(kinds[k], kind, n) && kinds[k][n] == ' ')
+            return reported(bt_checksum_check(path, kinds[k], NULL, &err), &err);
+    bt_errors_add(&err, "%s: no kind of a sealed file; give result, ensemble, field or checkpoint", kind);
+    return reported(BT_ERR_USAGE, &err);
+}
+
+/// The records of one member.
+static bt_member_records one_record(uint64_t *seen, const void *made_by, size_t n)
+{
+    bt_member_records r = {.n = 1, .seen = seen};
+    bt_checksum_digest_text(made_by, n, r.study);
+    return r;
+}
+
+bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n)
+{
+    uint64_t seen = 0;
+    bt_errors err = {0};
+    bt_member_records r = one_record(&seen, made_by, n);
+    return reported(bt_member_record_write(&r, 0, name, folder, &err), &err);
+}
+
+bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n)
+{
+    uint64_t seen = 0;
+    bt_errors err = {0};
+    bt_member_records r = one_record(&seen, made_by, n);
+    return reported(bt_member_record_check(&r, 0, name, folder, &err), &err);
 }
 
 static char *limits_json(void)

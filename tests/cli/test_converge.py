@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import made_up_ensemble as made_up
+from made_up_ensemble import record
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
 from bergtow import cli
 from bergtow.errors import RunError
-from bergtow.result import integrity as soundness
 from bergtow.result.run import Run
 from bergtow.study import converge
 from bergtow.study import runs as case_runs
@@ -274,7 +274,8 @@ def settled(runs, i, values=None, name="case", **summary):
     (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
     for file in ("result.h5", "case.resolved.yml"):
         (runs.path(name, i) / file).write_text(f"{file} of field {i}")
-    soundness.keep(runs.path(name, i), *runs.record(name, i, values or {}))
+    whose, made_by = runs.record(name, i, values or {})
+    record(runs.path(name, i), made_by.decode(), whose)
     (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(i, values or {})))
 
 
@@ -303,11 +304,11 @@ def another(path):
 
 
 @pytest.mark.parametrize("file, change, said", [
-    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json changed since"),
-    ("summary.json", cut, "summary.json changed since"), ("summary.json", another, "summary.json changed since"),
-    ("summary.json", Path.unlink, "summary.json is missing"), ("result.h5", another, "result.h5 changed since"),
-    ("finished", another, "is of another run"), ("finished", cut, "changed since"),
-    ("finished", Path.unlink, "missing")])
+    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json: has changed since"),
+    ("summary.json", cut, "summary.json: has changed since"), ("summary.json", another, "summary.json: has changed since"),
+    ("summary.json", Path.unlink, "summary.json: "), ("result.h5", another, "result.h5: has changed since"),
+    ("finished", another, "is of another member"), ("finished", cut, "has changed since"),
+    ("finished", Path.unlink, "finished: ")])
 def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
     """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
     first = runs_of(tmp_path, CASE)
@@ -333,7 +334,7 @@ def test_a_changed_run_is_made_again(tmp_path):
     one.write_text(re.sub(r'("mean_ice_resistance_n": )\S+', r"\g<1>1e6,", one.read_text()))
     cut(other)
     again = script(*call, "--force", cwd=tmp_path)
-    assert again.returncode == 0 and again.stderr.count("summary.json changed since it finished; the run is made") == 2
+    assert again.returncode == 0 and again.stderr.count("summary.json: has changed since the member finished; the run is made") == 2
     assert json.loads((tmp_path / "out/converge.json").read_text())["rows"] == sound
 
 

@@ -21,9 +21,8 @@ import h5py
 import numpy as np
 
 from bergtow import _library
-from bergtow.errors import RunError
-from bergtow.result import at_least
-from bergtow.result import integrity as soundness
+from bergtow.errors import BergtowError, RunError
+from bergtow.result import at_least, integrity
 from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
@@ -156,9 +155,11 @@ class Ensemble:
         self._dropped = {}
 
     def _read(self):
-        fault = soundness.broken_seal(self.file, "ensemble 2") if soundness.available() else None
-        if fault:
-            raise RunError(self.file, fault, "run `bergtow ensemble` again: it makes the file anew")
+        try:
+            integrity.check_seal(self.file, "ensemble")
+        except BergtowError as error:
+            why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
+            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file anew") from None
         with h5py.File(self.file, "r") as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
@@ -207,8 +208,8 @@ class Ensemble:
             for m in np.flatnonzero(self.status == WAITING)
             if self.hole[m] in ("unsound", "unreadable")
         }
-        for m in np.flatnonzero(self.status == FINISHED) if soundness.available() else ():
-            why = soundness.fault_of_member(self.folder(m), self.name[m],
+        for m in np.flatnonzero(self.status == FINISHED):
+            why = integrity.fault_of_member(self.folder(m), self.name[m],
                                             self.study.encode()) if self.folder(m).is_dir() else None
             if why:
                 out[self.name[m]] = why

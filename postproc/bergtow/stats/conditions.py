@@ -4,7 +4,6 @@ them, distributions, peaks of collisions, sensitivity."""
 
 from bergtow.errors import RunError
 from bergtow.result import at_least, findings
-from bergtow.result import integrity as soundness
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, WAITING
 from bergtow.stats import loads
 from bergtow.stats import design_value as statement
@@ -222,7 +221,7 @@ def statistics(e, options):
         "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
         "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
-        "checked": soundness.available(), "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
+        "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
         "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
         "convergence": findings.read("converge", e.path)
     }

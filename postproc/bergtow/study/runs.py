@@ -27,8 +27,8 @@ from pathlib import Path
 
 from bergtow._calls import Calls
 from bergtow._interrupts import held
-from bergtow.errors import CASE, IO, USAGE, Refused, RunError
-from bergtow.result import integrity as soundness
+from bergtow.errors import CASE, IO, USAGE, BergtowError, Refused, RunError
+from bergtow.result import integrity
 from bergtow.result.run import Run
 from bergtow.study.case_file import files
 
@@ -157,14 +157,12 @@ class CaseRuns:
         path = self.path(name, i)
         if not self.stamped(name, i, values, "call.json"):
             return False
-        stamp = soundness.stamp(path)
+        stamp = integrity.stamp(path)
         if stamp and self._sound.get(path) == stamp:
             return True
-        fault = soundness.fault_of_member(path, *self.record(name, i, values)) if soundness.available() else None
+        fault = integrity.fault_of_member(path, *self.record(name, i, values))
         if fault:
             self.tell(path, f"{path}: {fault}; the run is made again")
-        elif not soundness.available():
-            self.tell(None, f"runs that are there are not checked: {soundness.MISSING}")
         else:
             self._sound[path] = stamp
         return not fault
@@ -216,8 +214,8 @@ class CaseRuns:
             self.failed[path] = why, code
             return why
         try:
-            soundness.keep(path, *self.record(name, i, values))
-        except (OSError, ValueError) as error:
+            integrity.keep(path, *self.record(name, i, values))
+        except BergtowError as error:
             self.failed[path] = str(error), IO
             return str(error)
         os.replace(path / "begun.json", path / "call.json")

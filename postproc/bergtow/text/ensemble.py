@@ -241,11 +241,6 @@ def report(s, markdown=False):
             f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
             f"window, nothing that is towed, or a line that parted before the window or early in it."
         )
-    if not s["checked"]:
-        lines.append(
-            "Whether the files are as they were written was not checked: this machine has neither libxxhash nor the "
-            "Python package xxhash."
-        )
     if s["behind"]:
         lines.append(
             f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
