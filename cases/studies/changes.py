@@ -22,7 +22,7 @@ from bergtow.cli import command  # noqa: E402
 from bergtow.plot import style  # noqa: E402
 from bergtow import table as text_table  # noqa: E402
 from bergtow.errors import RunError  # noqa: E402
-from bergtow.result.members import Ensemble, reading, short_key, worded  # noqa: E402
+from bergtow.result.members import Members, reading, short_key, worded  # noqa: E402
 from bergtow.plot.variants import relative_change  # noqa: E402
 from bergtow.stats.mean import t_interval  # noqa: E402
 from bergtow.table import number  # noqa: E402
@@ -35,7 +35,7 @@ LINES = ((style.INK, "-"), (style.ICE, "-"), (style.ICE, "--"), (style.TOW, "-")
 def named(text):
     """(name, ensemble) of NAME=FOLDER or FOLDER."""
     name, given, folder = text.rpartition("=")
-    return (name if given else Path(folder).name), Ensemble(folder)
+    return (name if given else Path(folder).name), Members(folder)
 
 
 def fields(e, c):

@@ -30,7 +30,7 @@ from bergtow import table as text_table  # noqa: E402
 from bergtow.result.at_least import AtLeast  # noqa: E402
 from bergtow.errors import RunError  # noqa: E402
 from bergtow.result.run import Run  # noqa: E402
-from bergtow.result.members import Ensemble  # noqa: E402
+from bergtow.result.members import Members  # noqa: E402
 from bergtow.reporting.ensemble import OPTIONS  # noqa: E402
 
 ENDED = "step 13: 2 steps have no solution, since bodies are locked, and guard.no_solution allows 1: let ice give way"
@@ -148,7 +148,7 @@ def test_a_mean_of_runs_of_which_one_is_a_lower_bound_is_one():
 # ---- an ensemble
 
 def made(folder, some, sampling="grid"):
-    return Ensemble(made_up.write(folder, some, sampling=sampling))
+    return Members(made_up.write(folder, some, sampling=sampling))
 
 
 def statistics(e, **options):

@@ -23,7 +23,7 @@ from bergtow.reporting import design, pdf
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
 from bergtow.result import origins as report_case
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.study import domain_width
 from bergtow.text import loads as loads_text
@@ -75,7 +75,7 @@ def test_the_study_that_it_makes(made):
     assert study["parameters"] == {"ice.concentration": [0.2, 0.4]} and study["repeats"] == 5 and study["seed"] == 3
     assert study["set"] == {"output.panels": True}
     assert study["base"] == "../case.yml" and study["title"] == f"{TITLE}: ice concentration 20 to 40 %"
-    e = Ensemble(made)
+    e = Members(made)
     assert e.complete and e.n == 10 and not list(made.glob("replay-*"))
     assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
 
@@ -111,7 +111,7 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
                 "--quiet", "--no-pdf", "--no-replay", *more)
     assert yaml.safe_load((out / "design.yml").read_text()).get("with") == wider
     narrow = 3 if "domain.width=6 m" in more else 2.5
-    widths = list(Ensemble(out).summary["domain_body_widths"])
+    widths = list(Members(out).summary["domain_body_widths"])
     assert widths == pytest.approx([narrow, 10 if wider else narrow], rel=0.01)
     assert ("at 45 % the domain is made 20.1 m wide" in capsys.readouterr().out) == bool(wider)
     page = (out / "report.html").read_text()
@@ -250,7 +250,7 @@ def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
     work.end = design.time.monotonic() + 1000
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     assert asked == [2, 8] and design.fields_settled(tmp_path / "out") == 8
-    assert "c001-r002" in Ensemble(tmp_path / "out").holes()
+    assert "c001-r002" in Members(tmp_path / "out").holes()
     asked.clear()  # a later call begins with what is there
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     assert asked == [8] and design.fields_settled(tmp_path / "nowhere") == 0

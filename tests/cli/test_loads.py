@@ -19,7 +19,7 @@ from bergtow.plot import loads as plot_loads
 from bergtow.reporting import statistics
 from bergtow.reporting import method as report_method
 from bergtow.reporting.ensemble import OPTIONS
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
@@ -266,7 +266,7 @@ def test_a_condition_whose_fields_differ_is_warned_of(tmp_path):
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     alike, unlike = (c["loads"]["tow_force"]["alike_p"] for c in s["conditions"])
     assert alike > 0.01 > unlike
-    cases = statement_module.cases(Ensemble(tmp_path / "all"), s)
+    cases = statement_module.cases(Members(tmp_path / "all"), s)
     assert "scatter of fields that are alike" in report_method.limits(cases)[-1]
     assert "fields that are alike" in " ".join(report_method.method(s, cases))
 
@@ -418,7 +418,7 @@ def test_the_branch_that_bears_more_is_designed_for(statement):
 def test_what_speaks_against_a_design_tension_is_named_as_of_the_tow_force(statement):
     """Red when the sample of the tow force alone is looked at, or a branch without a value is passed over."""
     folder, _, s = statement
-    e, c = Ensemble(folder), known(s["conditions"][1])
+    e, c = Members(folder), known(s["conditions"][1])
     said = lambda c: statement_module.statement(e, e.conditions()[1].finished, c)  # noqa: E731
     first, second = (c["loads"][name] for name in LOADED[2:])
     before, label = said(c), second["label"]
@@ -544,7 +544,7 @@ def options(**changes):
 
 @pytest.mark.slow
 def test_model_scale_and_limits_of_line_and_ice(tmp_path):
-    e = Ensemble(towed(tmp_path / "a", pressure=1e6, load=2e6))
+    e = Members(towed(tmp_path / "a", pressure=1e6, load=2e6))
     e.summary["estimates_length_scale"] = np.full(e.n, 25.0)
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
@@ -572,7 +572,7 @@ def test_too_little_is_reported_and_not_guessed(tmp_path):
 def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):
     folder = towed(tmp_path / "a", concentrations=(0.5,))
     (folder / "members/c001-r001").rename(folder / "elsewhere")
-    e = Ensemble(folder)
+    e = Members(folder)
     found = loads.statistics(e, e.conditions()[0].finished, options())
     assert found["tow_force"]["fields"] == 6 and found["line_tension_1"]["fields"] == 5
 
@@ -597,7 +597,7 @@ def sparse(folder, fields=10, meet=4, n=SPARSE, changes=None):
 
 def of_all(folder, **changes):
     """statistics.json of a folder as a dict, and its tables."""
-    s = ensemble.statistics(Ensemble(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
+    s = ensemble.statistics(Members(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
     return s, ensemble_text.report(s, False)
 
 
@@ -640,7 +640,7 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
     assert "saturated at 1e+06 N" in thrust["over_threshold"]["refused"] and "value" not in thrust["design"]
     assert "saturated at 1e+06 N" in text and thrust["largest"] == pytest.approx(1e6)
     statistics.write(s, tmp_path, False)
-    e = Ensemble(tmp_path / "a")
+    e = Members(tmp_path / "a")
     for name in ("tow_force", "vessel_thrust"):
         plot_ensemble.draw_above(e, s["conditions"], name)
         plot_ensemble.draw_returns(e, s["conditions"], name)
@@ -718,7 +718,7 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     none; the start is that of all tows, of those too whose line parts in it."""
     folder = parting(tmp_path / "a", {0: [(900, 1)], 4: [(200, 1)]}, jerk={4: 4e6})
     s, text = of_all(folder)
-    e, (c,) = Ensemble(folder), s["conditions"]
+    e, (c,) = Members(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
     told = script("statistics", folder, "--resamples", 1, "--force").stderr
     assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
@@ -779,9 +779,9 @@ def test_members_without_their_folders_parted_all_the_same(tmp_path):
     """Red when events were in their folders alone: tows adrift had means of the whole window, and no word of it."""
     folder = parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)]}, fields=6)
     there, _ = of_all(folder)
-    means = Ensemble(folder).mean
+    means = Members(folder).mean
     shutil.rmtree(folder / "members")
-    e, (gone, _) = Ensemble(folder), of_all(folder)
+    e, (gone, _) = Members(folder), of_all(folder)
     assert np.array_equal(e.mean, means, equal_nan=True) and np.isnan(means[[3, 4]]).all()
     assert [e.adrift(m) for m in range(6)] == [900, np.inf, np.inf, 310, 200, np.inf]
     for s in (there, gone):
@@ -791,7 +791,7 @@ def test_members_without_their_folders_parted_all_the_same(tmp_path):
 
 def test_the_picture_of_return_levels(statement):
     folder, _, s = statement
-    e = Ensemble(folder)
+    e = Members(folder)
     assert [n for n, _ in plot_ensemble.pictures(e, None, s["conditions"])][:2] == ["returns-tow-force",
                                                                                     "returns-ice-resistance"]
     for c in s["conditions"]:  # as JSON has it

@@ -17,7 +17,7 @@ from harness import NUMERIC, Run, area, changed, differing, quick, run, warned, 
 from resuming import done
 
 from bergtow.result import run as bergtow_read
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.stats import loads
 
 A = 1.0
@@ -334,7 +334,7 @@ def test_a_tow_without_a_load_has_no_tail():
     share, none = [0.0, 0.2, np.nan], np.zeros(3, int)
     e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [], condition=none,
                         status=none, name=list("abc"))
-    e.without_bound = lambda rows: Ensemble.without_bound(e, rows)
+    e.without_bound = lambda rows: Members.without_bound(e, rows)
     load = SimpleNamespace(name="ice_resistance", needs="")
     assert "no bound in some steps of 1 of 3 tows" in loads.cut_off(e, [0, 1, 2], load)
     assert loads.cut_off(e, [0, 2], load) == ""

@@ -33,7 +33,7 @@ from bergtow.plot import force as plot_force
 from bergtow.plot import resistance as plot_resistance
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.result.run import Run
 
 pytestmark = pytest.mark.usefixtures("look")
@@ -243,7 +243,7 @@ def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_
     done = script("statistics", ensemble, "--resamples", 50)
     assert done.returncode == 0, done.stderr
     assert "energy of the strip" in done.stdout
-    e = Ensemble(ensemble)
+    e = Members(ensemble)
     assert e.estimates["strip_energy"] == {"label": "energy of the strip", "on_top": False
                                            } and e.estimates["open_water_drag"]["on_top"]
     assert np.all(e.summary["max_moving_ice_kg"] > 0) and np.all(np.isfinite(e.summary["mean_carried_water_force_n"]))
@@ -273,7 +273,7 @@ def test_files_of_an_earlier_version_are_read(ensemble, tmp_path):
         drawn = [t.get_text() for t in plot_force.draw(run).axes[1].get_legend().get_texts()]
         assert drawn[:2] == ["tow force", "ice resistance"] and "drag force" in drawn
         assert len(report_run.forces(run)) > 5
-    e = Ensemble(ensemble)
+    e = Members(ensemble)
     e.meaning = {key: {} for key in e.meaning}
     e.__dict__.pop("estimates", None)
     assert [name for name, estimate in e.estimates.items() if estimate["on_top"]] == ["open_water_drag"]

@@ -20,7 +20,7 @@ from bergtow.errors import RunError
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
 from bergtow.result import origins as report_case
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import variance as stat_budget
 from bergtow.text import loads as loads_text
@@ -83,7 +83,7 @@ def newtons(text):
 
 @pytest.mark.slow
 def test_numbers_are_those_of_the_statistics(page, study):
-    s = ensemble.statistics(Ensemble(study), argparse.Namespace(**OPTIONS))
+    s = ensemble.statistics(Members(study), argparse.Namespace(**OPTIONS))
     found = tables(page)
     head, *rows = found["Mean ice resistance"]
     factor = 1000.0 if "kN" in head[2] else 1.0
@@ -104,7 +104,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
 def test_the_answer_is_the_design_statement(tmp_path):
     """Rounded to what the interval leaves; of fields that are long enough for a tail."""
     rng = np.random.default_rng(8)
-    e = Ensemble(made_up.write(tmp_path / "out", [
+    e = Members(made_up.write(tmp_path / "out", [
         member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, [], {})
@@ -199,16 +199,16 @@ def test_page_stands_alone_and_text_stays_text(page):
 def test_members_of_other_builds_and_lost_folders_are_reported(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
-    made_up.record(study / "members/c001-r001", Ensemble(study).study)
-    e = Ensemble(study)
+    made_up.record(study / "members/c001-r001", Members(study).study)
+    e = Members(study)
     assert "2 builds" in e.builds
     assert "2 builds" in " ".join(report_ensemble.context(study)["warnings"])
     (study / "members/c001-r002").rename(study / "members/lost")
-    assert Ensemble(study).without_folder == ["c001-r002"]
+    assert Members(study).without_folder == ["c001-r002"]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
-    assert not Ensemble(study).builds
+    assert not Members(study).builds
 
 
 @pytest.mark.slow
@@ -267,7 +267,7 @@ def test_a_quantity_has_one_verdict(tmp_path):
     def said(name, **keys):
         case = "run:\n  dt: {dt}\ndomain:\n  width: {width}\n".format(**{"dt": "2 s", "width": "10 m"} | keys)
         some = [member(np.ones(50), {}, 0, case=case, start=10.0) for _ in range(2)]
-        e = Ensemble(made_up.write(tmp_path / name, some))
+        e = Members(made_up.write(tmp_path / name, some))
         return dict(report_method.beyond({"converge": {"rows": rows}}, e))["width, length, time step, tolerance, start"]
     assert said("a") == "it depends on dt; open is length; no effect that matters of width, window"
     assert said("b", dt="1 s") == "open is length; no effect that matters of dt, width, window"
@@ -278,7 +278,7 @@ def test_a_quantity_has_one_verdict(tmp_path):
 def test_results_of_another_case_or_of_before_are_doubted(tmp_path):
     case = "ice:\n  size: {} m\n"
     folder = made_up.write(tmp_path / "e", [member(np.ones(50), {}, 0, case=case.format(30)) for _ in range(2)])
-    e = Ensemble(folder)
+    e = Members(folder)
     def said(name, place=folder, **found):
         place.mkdir(exist_ok=True)
         (place / f"{name}.json").write_text(json.dumps(found))
@@ -332,7 +332,7 @@ variants:
     tow.speed: 0.2 m/s
 """)
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     cases = report_ensemble.statement.cases(e, s)
     limits = report_method.limits(cases)

@@ -18,7 +18,7 @@ from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import force as plot_force
 from bergtow.reporting import ensemble as report_ensemble
-from bergtow.result.members import DOUBTS, Ensemble
+from bergtow.result.members import DOUBTS, Members
 from bergtow.result.run import Run
 from bergtow.stats import loads
 from bergtow.stats import conditions as ensemble
@@ -81,7 +81,7 @@ class Words:
 def reworded(folder, copy):
     """A copy of an ensemble's folder in other words."""
     shutil.copytree(folder, copy)
-    words, study = Words(), Ensemble(folder).study
+    words, study = Words(), Members(folder).study
     for member in (copy / "members").iterdir():
         if (member / "finished").exists():
             words.in_summary(member / "summary.json")
@@ -125,7 +125,7 @@ def test_statistics_and_pictures_of_an_ensemble(both):
     """Red at a regular expression for "the last line parted at", digits stripped from a reason, warnings counted
     beyond the known checks, and words for what a series needs."""
     plain, other, words = both
-    first, second = Ensemble(plain), Ensemble(other)
+    first, second = Members(plain), Members(other)
     doubts = [first.doubts(m) for m in range(first.n)]
     assert doubts == [second.doubts(m) for m in range(second.n)]
     assert set().union(*doubts) >= {"unsteady", "short", "few"}
@@ -147,11 +147,11 @@ def test_statistics_and_pictures_of_an_ensemble(both):
 def test_statistics_without_the_folders_of_the_members(both, tmp_path):
     """What of them is in ensemble.h5 is the same, and known by codes."""
     plain, other, _ = both
-    e = Ensemble(plain)
+    e = Members(plain)
     for folder in (plain, other):
         (alone := tmp_path / folder.name).mkdir()
         shutil.copy(folder / "ensemble.h5", alone)
-        there = Ensemble(alone)
+        there = Members(alone)
         assert np.array_equal(there.mean, e.mean, equal_nan=True) and there.without_mean == e.without_mean
         for m in range(e.n):
             assert there.doubts(m) == e.doubts(m) and there.adrift(m) == e.adrift(m)
@@ -165,7 +165,7 @@ def test_statistics_without_the_folders_of_the_members(both, tmp_path):
 def test_the_picture_of_a_run(both):
     plain, other, words = both
     for m in (0, 8):
-        with Run(Ensemble(plain).folder(m)) as one, Run(Ensemble(other).folder(m)) as two:
+        with Run(Members(plain).folder(m)) as one, Run(Members(other).folder(m)) as two:
             assert one.verdict[0] == two.verdict[0]
             (numbers, _), (again, _) = drawn(plot_force.draw(one)), drawn(plot_force.draw(two))
             assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(numbers, again))
@@ -188,7 +188,7 @@ def test_every_doubt_follows_from_numbers_and_codes(tmp_path):
     plain = made_up.write(tmp_path / "plain", members)
     reworded(plain, tmp_path / "other")
     for folder in (plain, tmp_path / "other"):
-        assert [Ensemble(folder).doubts(m) for m in range(len(some))] == [wanted for _, _, wanted in some]
+        assert [Members(folder).doubts(m) for m in range(len(some))] == [wanted for _, _, wanted in some]
 
 
 def test_each_code_has_a_row_and_each_warning_a_code():

@@ -23,7 +23,7 @@ from bergtow.plot import chains as plot_chains
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import sweep as plot_sweep
 from bergtow.result import integrity as soundness
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import mean as stat_mean
@@ -276,7 +276,7 @@ def test_a_member_that_met_little_ice_is_known_without_its_folder(tmp_path):
             for k, more in enumerate(({"n_contact_stretches": 2.5}, {"n_contact_stretches": 12.0}, {}))]
     folder = made_up.write(tmp_path / "all", made)
     for there in (True, False):
-        assert [Ensemble(folder).doubts(m) for m in range(3)] == [{"few"}, {"short"}, {"short"}], there
+        assert [Members(folder).doubts(m) for m in range(3)] == [{"few"}, {"short"}, {"short"}], there
         shutil.rmtree(folder / "members", ignore_errors=True)
 
 
@@ -290,7 +290,7 @@ def test_doubts_are_known_without_the_folders_and_by_codes_alone(tmp_path):
         {"window": {"verdict": "steady"}}))]
     folder = made_up.write(tmp_path / "all", made)
     for _ in range(2):
-        e = Ensemble(folder)
+        e = Members(folder)
         assert [e.doubts(m) for m in range(4)] == [{"unsteady"}, {"short", "other"}, {"few", "other"}, set()]
         assert [w["code"] for w in e.warnings(1)] == ["too_short", "overlap"]
         shutil.rmtree(folder / "members", ignore_errors=True)
@@ -300,7 +300,7 @@ def test_members_of_two_builds_are_reported(tmp_path):
     folder = made_up.write(tmp_path / "all", [made_up.member(np.ones(50) + k, {}, 0) for k in range(3)])
     with h5py.File(folder / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
-    made_up.record(folder / "members/c001-r001", Ensemble(folder).study)
+    made_up.record(folder / "members/c001-r001", Members(folder).study)
     result = script("statistics", folder, "--resamples", 1)
     assert "The members come from 2 builds of the program" in result.stdout
     assert "2 builds" in json.loads((folder / "statistics.json").read_text())["builds"]
@@ -322,7 +322,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
         assert stop.value.status == 2
     (tmp_path / "ensemble.h5").write_bytes(b"no HDF5")
     with pytest.raises(RunError, match="is no ensemble"):
-        Ensemble(tmp_path)
+        Members(tmp_path)
     waiting = made_up.write(tmp_path / "w", [made_up.member([1.0] * 30, {}, 0, status=made_up.WAITING)])
     for command in ("statistics", "plot-ensemble"):
         with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
@@ -389,17 +389,17 @@ def test_a_damaged_member_is_in_no_number(tmp_path, damage):
 def test_the_record_of_a_member_is_that_of_its_study(tmp_path):
     """A member of another study, whatever its files, is none of this one."""
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0)])
-    member, study = folder / "members/c001-r001", Ensemble(folder).study.encode()
+    member, study = folder / "members/c001-r001", Members(folder).study.encode()
     assert soundness.fault_of_member(member, "c001-r001", study) is None
     assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "finished: is of another study"
 
 
 def test_a_damaged_ensemble_file_is_refused(tmp_path):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0) for _ in range(2)])
-    assert Ensemble(folder).n == 2
+    assert Members(folder).n == 2
     flip(folder / "ensemble.h5", (folder / "ensemble.h5").stat().st_size - 9)
     with pytest.raises(RunError, match="do not fit their digest; run `bergtow ensemble` again"):
-        Ensemble(folder)
+        Members(folder)
 
 
 def test_members_without_a_folder_are_reported(tmp_path, capsys):
@@ -415,7 +415,7 @@ def test_members_without_a_folder_are_reported(tmp_path, capsys):
 # ---- pictures
 
 def test_the_law_of_the_speed_is_found(plain):
-    e = Ensemble(plain[0])
+    e = Members(plain[0])
     for words, some in plot_sweep.groups(e, "tow.speed"):
         exponent, low, high, _ = plot_sweep.power_law([c.values["tow.speed"] for c in some],
                                                       [plot_ensemble.of(e, c.finished) for c in some])
@@ -427,7 +427,7 @@ def test_the_law_of_the_speed_is_found(plain):
 
 
 def test_the_sweep_shows_fields_means_and_jams(plain):
-    e = Ensemble(plain[0])
+    e = Members(plain[0])
     figure = plot_ensemble.draw_sweep(e, "ice.concentration")
     panel = next(a for a in figure.axes if a.get_title(loc="left") == "tow speed 0.1 m/s")
     shown = np.concatenate([line.get_ydata() for line in panel.lines if line.get_marker() in ("o", "x")])
@@ -447,7 +447,7 @@ def test_estimates_are_those_of_each_condition(tmp_path):
     some = [made_up.member(np.full(30, 100.0) + r, {"ice.concentration": a}, c,
                            estimates={n: f * v * v for n, f in made_up.ESTIMATES.items()})
             for c, (a, v) in enumerate(speeds.items()) for r in range(2)]
-    axes = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
+    axes = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
     factor = 1 if "(N)" in axes.get_ylabel() else 1000
     drawn = {line.get_label(): line.get_data() for line in axes.lines if line.get_marker() == "d"}
     x, force = drawn["Lichey-Hellmer"]
@@ -462,7 +462,7 @@ def test_fields_beside_a_value_of_zero_are_in_the_picture(tmp_path):
     """Red when the axis begins at the least value: half of its fields stand left of it."""
     some = [made_up.member(np.full(30, 100.0 + w + r), {"tow.direction": w}, c)
             for c, w in enumerate((0.0, 0.5)) for r in range(4)]
-    e = Ensemble(made_up.write(tmp_path / "a", some))
+    e = Members(made_up.write(tmp_path / "a", some))
     axes = plot_ensemble.draw_sweep(e, "tow.direction").axes[0]
     dots = np.concatenate([line.get_xdata() for line in axes.lines if line.get_marker() == "o"])
     low, high = axes.get_xlim()
@@ -472,7 +472,7 @@ def test_fields_beside_a_value_of_zero_are_in_the_picture(tmp_path):
 def test_negative_values_are_in_the_picture(tmp_path):
     some = [made_up.member(np.full(30, 100.0 + w + r), {"air.wind_x": w}, c)
             for c, w in enumerate((-10.0, 0.0, 10.0)) for r in range(2)]
-    low, high = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "air.wind_x").axes[0].get_xlim()
+    low, high = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "air.wind_x").axes[0].get_xlim()
     assert low < -10 and high > 10
 
 
@@ -491,7 +491,7 @@ def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
         for i, (a, t) in enumerate(rng.random((40, 2)))
     ]
     folder = made_up.write(tmp_path / "a", members, sampling="latin-hypercube")
-    e = Ensemble(folder)
+    e = Members(folder)
     assert e.sampled and plot_ensemble.numeric(e) == ["ice.concentration", "ice.thickness"] and [
         n for n, _ in plot_ensemble.pictures(e, None, [])
     ][-1] == "sensitivity"
@@ -504,7 +504,7 @@ def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
     rng = np.random.default_rng(3)
     some = [made_up.member(np.full(30, level + 0.01 * r), {"ice.thickness": float(t)}, c)
             for c, (t, level) in enumerate(zip(rng.random(24), rng.normal(100, 10, 24))) for r in range(6)]
-    e = Ensemble(made_up.write(tmp_path / "a", some, sampling="latin-hypercube"))
+    e = Members(made_up.write(tmp_path / "a", some, sampling="latin-hypercube"))
     bars = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].containers[0]
     at, centre = bars[0].get_data()
     half = [(s[1, 1] - s[0, 1]) / 2 for s in bars[2][0].get_segments()]
@@ -521,7 +521,7 @@ def test_a_map_says_what_it_is_the_mean_of(tmp_path):
         "ice.concentration": a, "tow.speed": v, "ice.thickness": t}, c)
         for c, (a, v, t) in enumerate((a, v, t) for a in (0.2, 0.5) for v in (0.1, 0.2) for t in (1.0, 2.0, 3.0))
         for r in range(4)]
-    e = Ensemble(made_up.write(tmp_path / "a", some))
+    e = Members(made_up.write(tmp_path / "a", some))
     e.seed[:] = np.arange(len(some)) % 4
     figure = plot_ensemble.draw_map(e, "ice.concentration", "tow.speed")
     assert any("mean of 3 conditions of thickness" in t.get_text() for t in figure.texts)
@@ -537,7 +537,7 @@ def test_pictures_name_every_conversion(tmp_path):
     def label(second):
         some = [made_up.member(np.ones(30), {"ice.concentration": a}, c, peaks=peaks, conversion=how)
                 for c, (a, how) in enumerate([(0.2, "half-sine of 0.1 s"), (0.5, second)]) for _ in range(2)]
-        e = Ensemble(made_up.write(tmp_path / second, some))
+        e = Members(made_up.write(tmp_path / second, some))
         tails = [{"refused": "few"}] * 2
         return plot_ensemble.draw_exceedance(e, None, tails).axes[0].get_xlabel()
     assert label("half-sine of 0.1 s") == "peak of a collision (N), half-sine of 0.1 s"
@@ -565,7 +565,7 @@ def test_a_small_ensemble_of_the_program(tmp_path):
     assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
     result = script("statistics", tmp_path / "all", "--resamples", 9)
     assert result.returncode == 0, result.stderr
-    e, s = Ensemble(tmp_path / "all"), json.loads((tmp_path / "all/statistics.json").read_text())
+    e, s = Members(tmp_path / "all"), json.loads((tmp_path / "all/statistics.json").read_text())
     assert [c["members"]["used"] for c in s["conditions"]] == [5, 5]
     for m in range(e.n):  # the program and the script estimate the same mean, error and correlation time
         with Run(e.folder(m)) as r:

@@ -12,7 +12,7 @@ from harness import ROOT, call, write_case
 
 from bergtow import cli
 from bergtow.plot import variants as plot_variants
-from bergtow.result.members import Ensemble
+from bergtow.result.members import Members
 
 pytestmark = pytest.mark.usefixtures("look")
 BASE = {
@@ -57,7 +57,7 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
     (tmp_path / "study.yml").write_text(yaml.safe_dump(study, sort_keys=False))
     result = call("ensemble", "study.yml", "-o", "out", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     some = plot_variants.panels(e)
     assert [words for words, *_ in some] == ["concentration 30 %", "concentration 50 %"]
     for k, (_, first, mean, changes) in enumerate(some):

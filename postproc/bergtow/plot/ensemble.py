@@ -21,7 +21,7 @@ from bergtow.plot import variants as plot_variants
 from bergtow.plot.axes import axis_label, headline, numeric, of, wants_log
 from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
-from bergtow.result.members import EXCLUDABLE, Ensemble, reading, short_key
+from bergtow.result.members import EXCLUDABLE, Members, reading, short_key
 from bergtow.stats import loads
 from bergtow.stats import mean as stat_mean
 from bergtow.stats.conditions import member, nothing_to_count, sensitivity
@@ -182,7 +182,7 @@ def options(p):
 
 def perform(a):
     a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0, 10.0, 100.0], None, None, None, 1
-    e = Ensemble(a.folder)
+    e = Members(a.folder)
     dropped = e.exclude(a.exclude) if a.exclude else {}
     for name, kinds in dropped.items():
         print(f"left out: {name} ({', '.join(kinds)})")

@@ -29,7 +29,7 @@ from bergtow.arguments import above_zero, at_least_one
 from bergtow.errors import SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
-from bergtow.result.members import FINISHED, WAITING, Ensemble
+from bergtow.result.members import FINISHED, WAITING, Members
 from bergtow.result.origins import TITLE_BLOCK
 from bergtow.result.run import Run
 from bergtow.study import analysis, domain_width
@@ -111,7 +111,7 @@ def fields_settled(folder):
     """Fields that have finished or failed in every condition, from the first on; 0 where nothing is there. One that
     failed is not left out: a field that jams is none that can be done without."""
     try:
-        e = Ensemble(folder)
+        e = Members(folder)
     except RunError:
         return 0
     settled = [int(np.argmin(np.append(e.status[c.members] != WAITING, False))) for c in e.conditions()]
@@ -159,8 +159,8 @@ def run_case(work, a, case):
     if not whole_round and fields_settled(a.output) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
-    rate = seconds_a_field(Ensemble(a.output)) / work.jobs
-    replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Ensemble(a.output))
+    rate = seconds_a_field(Members(a.output)) / work.jobs
+    replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Members(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
     end = work.end
     while whole_round and rate > 0 and n < a.fields:  # at 0 all have failed
@@ -196,7 +196,7 @@ def hardest(e):
 
 def make_replay(work, a, left):
     """One tow once more, with frames: DIR/replay.html. It has the same state to the last bit."""
-    e = Ensemble(a.output)
+    e = Members(a.output)
     m = hardest(e)
     if m is None:
         return
@@ -285,6 +285,6 @@ def perform(a):
     report.write(a.output, [a.output / name for name in made], {name: getattr(a, name) for name in TITLE_BLOCK}, a.also,
                  force=a.force)
     print(f"{(time.monotonic() - began) / 60:.1f} min")
-    holes = Ensemble(a.output).holes()
+    holes = Members(a.output).holes()
     if holes:
         raise RunError(a.output, holes, "call again: it goes on; bergtow ensemble --retry-failed tries failed ones")

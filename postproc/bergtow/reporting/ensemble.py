@@ -20,7 +20,7 @@ from bergtow.reporting import method as report_method
 from bergtow.reporting import run as report_run
 from bergtow.result import compared, findings
 from bergtow.result import origins as report_case
-from bergtow.result.members import DOUBTS, FAILED, FINISHED, Ensemble, reading, short_key
+from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
 from bergtow.result.origins import scrubbed
 from bergtow.result.run import Run
 from bergtow.stats import loads
@@ -318,7 +318,7 @@ def doubt(name, found, folder, texts):
     if name == "converge" and (at := compared.alone(found, texts)):
         return f"studied at {at} alone: of the other tows of this report it says nothing"
     try:
-        why = compared.stale(found, Ensemble(folder)) if name == "budget" else ""
+        why = compared.stale(found, Members(folder)) if name == "budget" else ""
     except RunError:  # the folder holds what was found alone
         return ""
     return f"out of date, {why}: call bergtow budget again" if why else ""
@@ -401,7 +401,7 @@ def replays(e, place):
 def context(folder, place=None, given=None, also=()):
     """Everything that page/ensemble.html sets. place: where the page is to stand; given: {client, ...} in place of
     those of the case; also: further folders with the results of other scripts. Errors: RunError."""
-    e, options = Ensemble(folder), argparse.Namespace(**OPTIONS)
+    e, options = Members(folder), argparse.Namespace(**OPTIONS)
     s = ensemble.statistics(e, options)
     if s["holes"]:
         print(f"bergtow report: warning: {s['holes']}", file=sys.stderr)

@@ -10,7 +10,7 @@ from pathlib import Path
 from bergtow import arguments, writing
 from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero
 from bergtow.errors import RunError
-from bergtow.result.members import EXCLUDABLE, FINISHED, Ensemble
+from bergtow.result.members import EXCLUDABLE, FINISHED, Members
 from bergtow.stats import conditions, loads
 from bergtow.stats import fit as stat_fit
 from bergtow.text import ensemble as ensemble_text
@@ -119,7 +119,7 @@ def options(p):
 
 
 def perform(a):
-    e = Ensemble(a.folder)
+    e = Members(a.folder)
     folder = a.output or e.path
     for name in ("statistics.json", "statistics.csv"):
         writing.may_write(folder / name, a.force)

@@ -143,11 +143,6 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
     return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(_stored_class()(dataset, column, part))
 
 
-def _text(value: Any) -> Any:
-    value = value.decode() if isinstance(value, bytes) else value
-    return value.item() if isinstance(value, np.generic) else value
-
-
 #: groups of result.h5, and how the names of their variables begin
 _GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "collision_", "panels": "panel_",
            "events": "event_"}
@@ -182,13 +177,11 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
     BergtowError.
     """
-    xarray, hdf5 = _imported("xarray"), _imported("h5py")
+    xarray, _ = _imported("xarray"), _imported("h5py")
+    from bergtow.result.hdf5 import opened, plain
     path = Path(folder)
     path = path / "result.h5" if path.is_dir() else path
-    try:
-        file = hdf5.File(path)
-    except OSError as error:
-        raise BergtowError(f"{path}: cannot be read ({error}); give the folder that a run has left", IO) from None
+    file = opened(path, "give the folder that a run has left")
     if "time" not in file.get("series", {}):
         file.close()
         raise BergtowError(f"{path}: holds no series of a run; give the folder that a run has left", IO)
@@ -198,14 +191,14 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     def put(name: str, dims: tuple[str, ...], dataset: h5py.Dataset, column: int | None = None,
             part: slice | None = None, units: str | None = None, long_name: str | None = None) -> None:
         a = dict(dataset.attrs)
-        attributes = {"long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
+        attributes = {"long_name": long_name or plain(a.get("description", name.replace("_", " ")))}
         if "label" in a:
-            attributes["label"] = _text(a["label"])
+            attributes["label"] = plain(a["label"])
         assert name not in variables, name
         texts = dataset.dtype.kind == "O"
-        values = [_text(v) for v in dataset[()]] if texts else stored(dataset, column, part)
+        values = [plain(v) for v in dataset[()]] if texts else stored(dataset, column, part)
         if not texts and (units or "units" in a):
-            attributes["units"] = units or _text(a["units"])
+            attributes["units"] = units or plain(a["units"])
         variables[name] = xarray.Variable(dims, values, attributes)
 
     for group, prefix in _GROUPS.items():
@@ -230,7 +223,7 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             put("branch_tension", ("frame", "branch"), frames["line_tension"])
     if any("xy" in v.dims for v in variables.values()):
         variables["xy"] = xarray.Variable(("xy",), ["x", "y"])
-    attributes = {name: _text(value) for name, value in file.attrs.items()}
+    attributes = {name: plain(value) for name, value in file.attrs.items()}
     summary = path.with_name("summary.json")
     if summary.exists():
         attributes["summary"] = summary.read_text(encoding="utf-8")

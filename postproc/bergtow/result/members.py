@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Read the folder of an ensemble: its members, what was varied, their summaries, series, collisions and doubts.
 
-    e = Ensemble("out/concentration")
+    e = Members("out/concentration")
     for c in e.conditions():                       # members of one combination of values
         print(c.label, e.mean[c.finished])
     time, ice = e.series(m)                        # of member m, all of its run
@@ -23,6 +23,7 @@ import numpy as np
 from bergtow import _library
 from bergtow.errors import BergtowError, RunError
 from bergtow.result import at_least, integrity
+from bergtow.result.hdf5 import opened, plain
 from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
@@ -117,10 +118,6 @@ class WithoutBound:
         return "; ".join(parts)
 
 
-def _text(value):
-    return value.decode() if isinstance(value, bytes) else str(value)
-
-
 def _rows(f, group, columns):
     """Rows of a table of ensemble.h5; a table without rows is not there."""
     if group not in f:
@@ -134,7 +131,7 @@ def listed(names, most=8):
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-class Ensemble:
+class Members:
     """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason,
     hole: [M]; unsound: {name: why}."""
 
@@ -160,7 +157,7 @@ class Ensemble:
         except BergtowError as error:
             why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
             raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file anew") from None
-        with h5py.File(self.file, "r") as f:
+        with opened(self.file, "run `bergtow ensemble` again: it makes the file anew") as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])
@@ -172,26 +169,25 @@ class Ensemble:
             for member, time, kind, subject, value in _rows(f, "events", "member time kind subject value"):
                 self._events[int(member) - 1].append(
                     {"time_s": float(time), "kind": str(kind), "subject": int(subject), "value": float(value)})
-            self.parameters, self.units = {}, {}
+            self.parameters, self.units, self.assumed = {}, {}, {}
             for key, data in f["parameters"].items():
+                self.assumed[key] = {word: plain(data.attrs.get(word, b"")) for word in ("distribution", "source")}
                 self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
-                self.units[key] = _text(data.attrs.get("units", "1"))
+                self.units[key] = plain(data.attrs.get("units", "1"))
             self.state = list(f["members/state_hash"].asstr()[()])
             self.summary = {key: data[()] for key, data in f["summary"].items()}
             self.meaning = {
-                key: {k: v.decode() if isinstance(v, bytes) else v
-                      for k, v in data.attrs.items()}
-                for key, data in f["summary"].items()
+                key: {k: plain(v) for k, v in data.attrs.items()} for key, data in f["summary"].items()
             }
             self._series = {key: data[()] for key, data in f["series"].items()}
             self._described = {
-                key: [_text(data.attrs.get(what, "")) for what in ("label", "units", "description")]
+                key: [plain(data.attrs.get(what, "")) for what in ("label", "units", "description")]
                 for key, data in f["series"].items()
             }
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
-        self.study = _text(self.study)
+        self.study = plain(self.study)
         self.n = len(self.name)
-        self.title = _text(self.attributes.get("title", b"")) or self.path.resolve().name
+        self.title = plain(self.attributes.get("title", b"")) or self.path.resolve().name
 
     @staticmethod
     def _notes(f, group):

@@ -19,9 +19,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import yaml
 
 from bergtow.errors import RunError
 from bergtow.result import at_least
+from bergtow.result.hdf5 import first_line, opened, plain
 
 
 def within(time, start, end):
@@ -127,26 +129,22 @@ def place(vertices, pose):
 
 
 def parse_case(text):
-    """The scalars of a case as {"section.key": text}, quotes taken off.
+    """The values of a case file as {"section.key": text}, lists in one line; floes given by hand are left out."""
+    out = {}
 
-    This reads what bergtow itself writes (case.resolved.yml, /case): block mappings, one key a line. It is no YAML
-    parser; the sequence `floes:` is left out.
-    """
-    out, path = {}, []
-    for line in text.splitlines():
-        match = re.match(r"^( *)(\w+):(?: +(.*))?$", line.rstrip())
-        if not match or len(match[1]) > 2 * len(path):
-            continue
-        path = path[:len(match[1]) // 2] + [match[2]]
-        value = (match[3] or "").strip()
-        quoted = re.match(r'"((?:[^"\\]|\\.)*)"', value)
-        if quoted:
-            value = json.loads('"' + re.sub(r"\\x(..)", r"\\u00\1", quoted[1]) + '"')
-        else:
-            value = re.split(r"\s+#|^#", value)[0].strip()
-        if value:
-            out[".".join(path)] = value
-    return out
+    def walk(node, path):
+        if isinstance(node, dict):
+            for key, below in node.items():
+                walk(below, [*path, key])
+        elif path[0] != "floes":
+            out[".".join(path)] = _in_one_line(node)
+
+    walk(yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader)) or {}, [])
+    return {key: value for key, value in out.items() if value}
+
+
+def _in_one_line(node):
+    return f"[{', '.join(map(_in_one_line, node))}]" if isinstance(node, list) else node
 
 
 def case_value(case, key, default=np.nan):
@@ -183,7 +181,7 @@ class Run:
         self.summary = self._read_summary(self.path / "summary.json")
         self._file = self._open()
         self._cache = {}
-        self.attributes = {k: _plain(v) for k, v in self._file.attrs.items()}
+        self.attributes = {k: plain(v) for k, v in self._file.attrs.items()}
 
     def close(self):
         """Close result.h5. What was read stays usable."""
@@ -217,12 +215,8 @@ class Run:
     def _open(self):
         if not self.result.exists():
             raise RunError(self.result, "missing", "run the case again: this file holds series and frames")
-        try:
-            return h5py.File(self.result, "r")
-        except OSError as error:
-            raise RunError(self.result, f"not readable as HDF5 ({_first_line(error)})",
-                           "the file is truncated or still being written: wait for the run, or run the case again"
-                           ) from None
+        return opened(self.result, "the file is truncated or still being written: wait for the run, or run the case "
+                      "again")
 
     def _dataset(self, name):
         try:
@@ -242,7 +236,7 @@ class Run:
         try:
             data = node[index]
         except (OSError, RuntimeError) as error:
-            raise RunError(self.result, f"/{name} cannot be read ({_first_line(error)})",
+            raise RunError(self.result, f"/{name} cannot be read ({first_line(error)})",
                            "the file is damaged: run the case again") from None
         data = np.asarray(data)
         return data.astype(float) if data.dtype.kind == "f" else data
@@ -275,7 +269,7 @@ class Run:
 
     def units(self, name):
         """Units of a series, "" when the file gives none."""
-        return str(_plain(self._dataset(f"series/{name}").attrs.get("units", "")))
+        return str(plain(self._dataset(f"series/{name}").attrs.get("units", "")))
 
     def description(self, name):
         """One sentence on a series."""
@@ -283,7 +277,7 @@ class Run:
 
     def attribute(self, name, what):
         """An attribute of a series: role, label, summary, merge, ...; "" where the file has none."""
-        return str(_plain(self._dataset(f"series/{name}").attrs.get(what, "")))
+        return str(plain(self._dataset(f"series/{name}").attrs.get(what, "")))
 
     def label(self, name):
         """What pictures and tables call a series."""
@@ -297,7 +291,7 @@ class Run:
         if not any("role" in a for a in attributes.values()):
             return sorted((n for n in attributes if n.endswith("_force") or n == "ice_resistance"),
                           key=lambda n: (n != "tow_force", n != "ice_resistance", n)) if "balance" in roles else []
-        return sorted((n for n in attributes if _plain(attributes[n].get("role", "")) in roles),
+        return sorted((n for n in attributes if plain(attributes[n].get("role", "")) in roles),
                       key=lambda n: int(attributes[n]["order"]))
 
     @property
@@ -432,7 +426,7 @@ class Run:
         def read():
             if "events/kind_names" not in self._file:
                 return list(self.summary.get("events") or [])
-            names = [_plain(name) for name in self._read("events/kind_names")]
+            names = [plain(name) for name in self._read("events/kind_names")]
             rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
             return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
         return self._once("events", read)
@@ -450,7 +444,7 @@ class Run:
     # ---- case
 
     def _text(self, name):
-        return self._once(name, lambda: str(_plain(self._read(name)[()])))
+        return self._once(name, lambda: str(plain(self._read(name)[()])))
 
     @property
     def case_text(self):
@@ -543,7 +537,7 @@ class Run:
                 return []
             vertices, offsets = self._outlines("bodies")
             n = len(offsets) - 1
-            names = [str(_plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
+            names = [str(plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
             towed = int(np.ravel(self._read("bodies/towed"))[0])
             if len(names) != n or not -1 <= towed < n:
                 raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
@@ -564,7 +558,7 @@ class Run:
         if not isinstance(node, h5py.Group):
             raise RunError(self.result, f"has no /{name}",
                            f"{meaning}: run a case with a towed body and impact.conversion other than none")
-        return {**{k: _plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
+        return {**{k: plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
 
     @property
     def impacts(self):
@@ -584,7 +578,7 @@ class Run:
         group = self._file.get("panels")
         if not isinstance(group, h5py.Group) or "mean_load" not in group:
             return {}
-        out = {"units": str(_plain(group["mean_load"].attrs.get("units", "")))}
+        out = {"units": str(plain(group["mean_load"].attrs.get("units", "")))}
         if "load" in group:
             out["load"] = self._read("panels/load", ndim=2)
         return out
@@ -707,19 +701,6 @@ class Run:
         if self.towed is not None:
             pose[self.towed, :2] = self.wrap(pose[self.towed:self.towed + 1, :2], centre)[0]
         return [place(body.vertices, p) for body, p in zip(self.bodies, pose)]
-
-
-def _plain(value):
-    """An HDF5 attribute or scalar as str, number or array."""
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value[()]
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace").rstrip("\0")
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _first_line(error):
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def _extent(x):

@@ -15,7 +15,7 @@ from pathlib import Path
 from bergtow._program import program_path
 from bergtow.errors import CASE, SIGNAL, USAGE, RunError
 from bergtow.result import compared, findings
-from bergtow.result.members import FAILED, FINISHED, WAITING, Ensemble, listed
+from bergtow.result.members import FAILED, FINISHED, WAITING, Members, listed
 from bergtow.stats import loads
 from bergtow.stats import load as stat_load
 from bergtow.stats import variance as stat_budget
@@ -23,7 +23,6 @@ from bergtow.study import analysis
 from bergtow.study.runs import run_members
 from bergtow.table import hours_text
 
-import h5py
 import numpy as np
 
 BUDGET = 15.0  # min
@@ -34,15 +33,12 @@ OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
 def assumed(e):
     """{parameter: distribution and source as the study says them}."""
     out = {}
-    with h5py.File(e.file, "r") as f:
-        for key in e.parameters:
-            attributes = f[f"parameters/{key}"].attrs
-            words = {w: attributes.get(w, b"") for w in ("distribution", "source")}
-            out[key] = {w: v.decode() if isinstance(v, bytes) else str(v) for w, v in words.items()}
-            if e.units[key] not in ("", "1") and out[key]["distribution"]:
-                out[key]["distribution"] += f" {e.units[key]}"
-            if not out[key]["distribution"]:
-                out[key]["distribution"] = ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
+    for key, words in e.assumed.items():
+        out[key] = dict(words)
+        if e.units[key] not in ("", "1") and out[key]["distribution"]:
+            out[key]["distribution"] += f" {e.units[key]}"
+        if not out[key]["distribution"]:
+            out[key]["distribution"] = ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
     return out
 
 
@@ -196,7 +192,7 @@ def perform(a):
     folder = a.output or Path("out") / a.study.stem
     analysis.begin("budget", a.study, "study", folder, a.force)
     run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)
-    e = Ensemble(folder)
+    e = Members(folder)
     found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
     analysis.keep("budget", found, folder, a.force)
     if found["failed"]:

@@ -13,7 +13,7 @@ from bergtow._program import program_path
 from bergtow.case import setting
 from bergtow.errors import IO, OK, BergtowError
 from bergtow.functions import Picture, plot_ensemble, report, statistics
-from bergtow.result.dataset import Result, _imported, _text, _wrapper
+from bergtow.result.dataset import Result, _imported, _wrapper
 from bergtow.study.workers import on_workers
 
 if TYPE_CHECKING:
@@ -73,12 +73,9 @@ class Ensemble:
         return cls(out)
 
     def _open(self) -> h5py.File:
-        h5py = _imported("h5py")
-        path = self.folder / "ensemble.h5"
-        try:
-            return h5py.File(path)
-        except OSError as error:
-            raise BergtowError(f"{path}: cannot be read ({error})", IO) from None
+        _imported("h5py")
+        from bergtow.result.hdf5 import opened
+        return opened(self.folder / "ensemble.h5", "run `bergtow ensemble` again: it makes the file anew")
 
     @property
     def counts(self) -> dict[str, int]:
@@ -103,6 +100,7 @@ class Ensemble:
         reason. All have units and a long_name.
         """
         xarray, file = _imported("xarray"), self._open()
+        from bergtow.result.hdf5 import plain
         stored = _wrapper(xarray)
         variables: dict[str, Any] = {}
         coordinates: list[str] = []
@@ -110,15 +108,15 @@ class Ensemble:
             for name, dataset in file.get(group, {}).items():
                 if name == "id":
                     continue
-                attributes = {k: _text(dataset.attrs[k]) for k in ("units", "long_name") if k in dataset.attrs}
+                attributes = {k: plain(dataset.attrs[k]) for k in ("units", "long_name") if k in dataset.attrs}
                 name = f"series_{name}" if name in variables else name
                 dims = ("member", "sample")[:dataset.ndim]
-                values = [_text(v) for v in dataset[()]] if dataset.dtype.kind == "O" else stored(dataset)
+                values = [plain(v) for v in dataset[()]] if dataset.dtype.kind == "O" else stored(dataset)
                 variables[name] = xarray.Variable(dims, values, attributes)
                 if group == "parameters" or name in ("name", "condition", "repeat", "seed"):
                     coordinates.append(name)
-        attributes = {name: _text(value) for name, value in file.attrs.items()}
-        attributes["study"] = _text(file["study"][()])
+        attributes = {name: plain(value) for name, value in file.attrs.items()}
+        attributes["study"] = plain(file["study"][()])
         dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
         dataset.set_close(file.close)
         return dataset
