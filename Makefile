@@ -89,7 +89,7 @@ EXTENDED := $(BUILD)/tests/examples/extended
         validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
-all: $(BUILD)/bergtow $(BUILD)/libbergtow.so ## build build/release/bergtow and the library that Python loads (CONFIG=debug, ... for others)
+all: $(BUILD)/bergtow $(BUILD)/libbergtow.so ## build the program and the library (CONFIG=debug, validate, asan)
 
 lib: $(BUILD)/libbergtow.a $(BUILD)/libbergtow.so ## the library: static, and shared for programs and Python
 

@@ -86,6 +86,7 @@ _SIGNATURES = {
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
     "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p), POINTER(c_void_p)),
     "bt_file_holds": (c_char_p, c_char_p),
+    "bt_folder_lock": (Status, c_char_p, POINTER(c_int)),
     "bt_seal_check": (Status, c_char_p, c_char_p),
     "bt_record_keep": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),

@@ -295,18 +295,19 @@ static void turn_round(int n, double *v)
         }
 }
 
+const char *const bt_map_near_thickness[] = {"thick", "height",   "h",   "ice_height", "draft",
+                                             "dicke", "tykkelse", "sit", NULL};
+
 /// Is a property likely to be a thickness under another name?
 static bool is_nearly_thickness(const char *name)
 {
-    static const char *const others[] = {"thick", "height",   "h",   "ice_height", "draft",
-                                         "dicke", "tykkelse", "sit", NULL};
     char lower[64];
     size_t n = 0;
     for (; name[n] && n < sizeof lower - 1; n++)
         lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
     lower[n] = 0;
-    for (int i = 0; others[i]; i++)
-        if (!strcmp(lower, others[i])) return true;
+    for (int i = 0; bt_map_near_thickness[i]; i++)
+        if (!strcmp(lower, bt_map_near_thickness[i])) return true;
     return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
 }
 

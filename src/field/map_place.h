@@ -7,6 +7,9 @@
 #include "bergtow/field.h"
 #include "field/map_crs.h"
 
+/// Names of properties that come near to `thickness`, which is none of them; NULL ends them.
+extern const char *const bt_map_near_thickness[];
+
 #define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is one of small areas
 
 typedef struct bt_map_place {

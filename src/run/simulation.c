@@ -541,6 +541,13 @@ bt_status bt_record_check(const char *folder, const char *name, const void *made
     return reported(bt_member_record_check(&r, 0, name, folder, &err), &err);
 }
 
+bt_status bt_folder_lock(const char *dir, int *lock)
+{
+    bt_errors err = {0};
+    *lock = bt_lock_take(dir, NULL, &err);
+    return reported(*lock >= 0 ? BT_OK : BT_ERR_IO, &err);
+}
+
 static char *limits_json(void)
 {
     bt_json j = {0};
@@ -553,6 +560,10 @@ static char *limits_json(void)
     bt_json_number(&j, "window_drift", BT_STEADY_MATERIAL);
     bt_json_number(&j, "locking_body_widths", BT_ARCH_LOCKING);
     bt_json_number(&j, "map_farthest_m", BT_MAP_FARTHEST);
+    bt_json_string(&j, "map_local_crs", BT_MAP_LOCAL_NAME);
+    bt_json_open(&j, "map_words_near_thickness", '[');
+    for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&j, NULL, bt_map_near_thickness[k]);
+    bt_json_close(&j, ']');
     bt_json_close(&j, '}');
     return j.text;
 }

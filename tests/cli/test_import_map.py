@@ -421,7 +421,7 @@ def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles
             ring = inner[np.r_[True, np.abs(np.diff(inner, axis=0)).sum(axis=1) > 0]]
             ring = ring if np.abs(ring[0] - ring[-1]).sum() else ring[:-1]
         rings.append(np.round((ring + (70 * (k % 4), 70 * (k // 4))) * pixel, 5))
-    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    map_ = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     got, record = outlines(map_, "--heading", 90)
     assert counted(record)["stairs"] == 12 and record["floes"]["convex"] >= 11
     assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-4)
@@ -435,7 +435,7 @@ def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles
 def test_the_edge_of_an_image_is_seen_before_staircases_go(tmp_path):
     labels = discs(np.zeros((90, 90), np.int32), (20, 0, 12, 1), (60, 1, 15, 2), (40, 60, 20, 3))
     rings = [np.asarray(p.exterior.coords)[:-1] * (1, -1) for p, _ in map_read.regions(labels, labels > 0)]
-    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    map_ = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     counts = counted(outlines(map_)[1])
     assert counts["stairs"] == 3 and counts["cut kept"] == 2
 
@@ -446,7 +446,7 @@ def test_outlines_drawn_by_hand_are_no_staircases(tmp_path):
     crosses = [10 * cross + (200 * k, 30 * k) for k in range(3)] + [np.array([[0, 0], [10, 0], [10, 10], [0, 10]]) - 50]
     boxes = [np.array([[0, 0], [20, 0], [20, 30], [10, 30], [10, 20], [0, 20]]) + (50 * k, 10 * k) for k in range(6)]
     for rings in (boxes, crosses, RINGS):
-        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.LOCAL), "--centre", "0,0")
+        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.local_crs()), "--centre", "0,0")
         assert "stairs" not in counted(record)
         assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-9)
 
@@ -535,7 +535,7 @@ def test_a_map_that_is_turned_is_no_rectangle(tmp_path):
     rectangle is not full."""
     turned = np.array([[1, -1], [1, 1]]) / np.sqrt(2)
     rings = [(turned @ regular(x, y, 45, 4, np.pi / 4).T).T for x in range(-450, 500, 80) for y in range(-450, 500, 80)]
-    path = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    path = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     _, record = outlines(path)
     numbers = record["floes"]
     hull = (np.ptp(range(-450, 500, 80)) + 2 * 45 / np.sqrt(2)) ** 2

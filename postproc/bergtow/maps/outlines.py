@@ -231,7 +231,7 @@ def geojson(floes, found, plane):
     if found.about:
         head["description"] = found.about
     if local:
-        head["crs"] = {"type": "name", "properties": {"name": map_read.LOCAL}}
+        head["crs"] = {"type": "name", "properties": {"name": map_read.local_crs()}}
     lines = []
     for k, floe in enumerate(floes):
         ring = np.asarray(floe.polygon.exterior.coords)

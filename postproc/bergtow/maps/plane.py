@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bergtow.errors import RunError
-from bergtow.maps.read import INSTALL, LOCAL
+from bergtow.maps.read import INSTALL, local_crs
 
 WGS84 = "OGC:CRS84"   # degrees, longitude first
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
@@ -49,12 +49,12 @@ def vertices(geometry):
 
 
 def system(path, found, said, implied=False):
-    """The crs of a map: a pyproj.CRS, or LOCAL. found, said: of the file and of --crs, or None; implied: that of the
-    file says no more than its format, and gives way to --crs. Errors: RunError."""
+    """The crs of a map: a pyproj.CRS, or local_crs(). found, said: of the file and of --crs, or None; implied: that of
+    the file says no more than its format, and gives way to --crs. Errors: RunError."""
     if MISSING:
         raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
-    ours = None if said is None else LOCAL if said in ("local", LOCAL) else known(path, said, "--crs")
-    theirs = None if found is None else LOCAL if found == LOCAL else known(path, found, "its crs")
+    ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
+    theirs = None if found is None else local_crs() if found == local_crs() else known(path, found, "its crs")
     if theirs is None and ours is None:
         raise RunError(path, "says no coordinate reference system", SAY)
     if theirs is None or ours is None:
@@ -121,7 +121,7 @@ def hold_against(path, crs, xy, implied=False):
 class Plane:
     """A plane at a place. Degrees in, metres out."""
 
-    crs: object             #: of the map: a pyproj.CRS, or LOCAL (to compare the two, PROJ would parse the latter)
+    crs: object             #: of the map: a pyproj.CRS, or local_crs() (to compare the two, PROJ would parse it)
     centre: tuple           #: longitude, latitude, degrees; of local metres the place of 0, 0
     heading: float = None   #: degrees from north to east, of the first axis
     accuracy: float = 0.0   #: m, of the step to WGS 84; NaN: not known

@@ -19,13 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.maps import stairs as map_stairs
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
-LOCAL = "urn:x-bergtow:crs:local-metres-east-north"  # src/field/map_crs.h
 MOST_PIXELS = 400_000_000
-NEARLY = ("height", "h", "ice_height", "draft", "dicke", "tykkelse", "sit")  # as src/field/geojson.c
 IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # what GeoJSON is in where nobody says it [RFC 7946]
 #: of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
 CHART = {"POLY_TYPE", "PGON_TYPE", "CT", "E_CT", "N_CT", "SA", "E_SA", "FA", "E_FA", "ICECODE", "NIS_CLASS", "A_LEGEND"}
@@ -41,6 +40,11 @@ try:
     MISSING = None
 except ImportError as error:
     MISSING = error
+
+
+def local_crs():
+    """The name of metres east and north of no place on the earth."""
+    return _library.limit("map_local_crs")
 
 
 @dataclass
@@ -76,7 +80,7 @@ class Map:
     """What a file holds."""
 
     path: Path
-    crs: str                    #: WKT or a name, LOCAL, or None where the file says nothing
+    crs: str                    #: WKT or a name, local_crs(), or None where the file says nothing
     shapes: list
     implied: bool = False       #: the crs is the one that the format has where nobody says any
     seen: object = None         #: what was imaged, in the coordinates of the file; None: not known
@@ -154,7 +158,8 @@ def from_layer(path, source, how):
             layer.SetAttributeFilter(how.where)
         column = how.thickness or thickness_column(layer, columns)
         if not column:
-            found.near = [name for name in columns if "thick" in name.lower() or name.lower() in NEARLY]
+            found.near = [name for name in columns if "thick" in name.lower()
+                          or name.lower() in _library.limit("map_words_near_thickness")]
         for feature in layer:
             add_feature(found, feature, column)
     except RuntimeError as error:
@@ -247,7 +252,7 @@ def crs_of_layer(path, source, layer):
     crs = head_of(path).get("crs") if driver == "GeoJSON" else None
     if crs is not None:
         name = f"{crs.get('properties', {}).get('name') if isinstance(crs, dict) else None}"
-        return name, name.upper().replace("::", ":").endswith(IMPLIED)  # for PROJ to judge, but for LOCAL: plane.py
+        return name, name.upper().replace("::", ":").endswith(IMPLIED)  # for PROJ to judge, but for local_crs()
     reference = layer.GetSpatialRef()
     if reference is None or (reference.GetName() or "").lower().startswith("undefined"):
         return None, False
@@ -437,7 +442,7 @@ def of_labels(found, labels, valid, water, place, how):
     if place is None:
         rows, columns = labels.shape
         place = (-how.pixel * columns / 2, how.pixel, 0, how.pixel * rows / 2, 0, -how.pixel)
-        found.crs = LOCAL
+        found.crs = local_crs()
     thick = thickness_by_value(found.path, how.thickness)
     values, label_of = numbered(labels, ice)
     edge = unary_union([p for p, _ in regions(valid.astype(np.int32), valid)])

@@ -182,8 +182,8 @@ def _of_the_sample(e, rows, c, load):
         return out + [("no value", d["refused"])]
     out += _of_unlike_fields(load)
     hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
-    if hours > LONG * simulated > 0 and np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0) >= _library.limit(
-            "locking_body_widths"):
+    needed = np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0)
+    if hours > LONG * simulated > 0 and needed >= _library.limit("locking_body_widths"):
         out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
                     "for tows of the length simulated, one after the other",
                     f"{hours_text(hours)} against {hours_text(simulated)}"))

@@ -10,13 +10,11 @@ A run is kept, and one that was stopped goes on, while the case file, the files 
 values are what they were. One whose files do not fit the record is reported and made anew. One call at a time works in
 DIR/SUBJECT: it and its runs hold the lock of the folder.
 """
-import errno
-import fcntl
+import ctypes
 import hashlib
 import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -25,6 +23,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bergtow import _library
 from bergtow._calls import Calls
 from bergtow._interrupts import held
 from bergtow.errors import CASE, IO, USAGE, BergtowError, Refused, RunError
@@ -77,21 +76,15 @@ def stopped_by_limit(code, took, limit):
 
 @contextmanager
 def locked(folder):
-    """One call at a time in a folder, as src/base/lock.c has it of runs; yields the descriptor, which runs inherit: the
-    lock holds for as long as one of them is left. Errors: RunError."""
+    """One call at a time in a folder; yields the descriptor of its lock, which runs inherit: it holds for as long as
+    one of them is left. Errors: BergtowError."""
     folder.mkdir(parents=True, exist_ok=True)
-    with open(os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666), "r+") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:  # a file system without locks has to do without
-            if error.errno not in (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS):
-                who = lock.readline().strip() or "it has not said who"
-                raise RunError(folder, f"another call is at work in this folder ({who})",
-                               "wait for its end, or give another folder with -o") from None
-        lock.truncate(0)
-        lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
-        lock.flush()
-        yield lock.fileno()
+    lock = ctypes.c_int()
+    _library.library().bt_folder_lock(os.fsencode(folder), ctypes.byref(lock))
+    try:
+        yield lock.value
+    finally:
+        os.close(lock.value)
 
 
 @dataclass
