@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The Python package on libbergtow: cases, results and ensembles as datasets, its page, its installation."""
+import ctypes
 import copy
 import inspect
 import json
@@ -332,6 +333,25 @@ def test_a_python_without_packages_is_a_message(command):
                           env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")})
     assert said.returncode == IO and said.stderr.startswith("bergtow: bergtow needs numpy, which ")
     assert said.stderr.count("\n") == 1 and "python3-numpy (Debian)" in said.stderr
+
+
+def test_what_the_library_says_of_units_files_and_limits(tmp_path):
+    """Red: the unit of a bare angle is lost; a study with a base is a case; a limit is another than the program's."""
+    lib, value = bergtow._library.library(), ctypes.c_double()
+    for text, unit, wanted in (("1.5 kn", "m/s", 1.5 * 1852 / 3600), ("180", "rad", np.pi), ("2", "", 2.0)):
+        lib.bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+        assert value.value == pytest.approx(wanted, rel=1e-15)
+    for text, unit in ("1 m", "m/s"), ("x", ""), ("1", "furlong"):
+        with pytest.raises(bergtow.BergtowError):
+            lib.bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+    for text, kind in ("base: a.yml\nrepeats: 2\n", b"study"), ("run: {dt: 1}\n", b"case"), ("[1]\n", b""):
+        (tmp_path / "file.yml").write_text(text)
+        assert lib.bt_file_holds(os.fsencode(tmp_path / "file.yml")) == kind
+    header = (ROOT / "src/output/steady.h").read_text()
+    limits = bergtow._library.listed("limits")
+    for name, macro in (("window_independent", "INDEPENDENT"), ("window_contact_stretches", "STRETCHES"),
+                        ("window_drift", "MATERIAL")):
+        assert limits[name] == float(re.search(rf"#define BT_STEADY_{macro} (\S+)", header)[1])
 
 
 def test_modules_use_those_below_them():
