@@ -40,19 +40,36 @@ char *bt_case_resolved(const bt_case *c)
     return bt_case_text(c, BT_CASE_RESOLVED_HEAD);
 }
 
+/// The member of a key, of `size` bytes.
+static void member_of(const bt_case *c, const bt_key *k, void *out, size_t size)
+{
+    memcpy(out, (const char *)c + k->offset, size);
+}
+
 static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
 {
-    const char *member = (const char *)c + k->offset;
+    union {
+        double real;
+        int64_t integer;
+        bool yes;
+        unsigned choice;
+        const char *text;
+        const double *points;
+    } v;
     switch (k->type) {
-    case BT_KEY_REAL: bt_json_number(j, k->name, *(const double *)member); break;
-    case BT_KEY_INT: bt_json_int(j, k->name, *(const int64_t *)member); break;
-    case BT_KEY_BOOL: bt_json_bool(j, k->name, *(const bool *)member); break;
-    case BT_KEY_CHOICE: bt_json_string(j, k->name, k->choices[*(const unsigned *)member]); break;
-    case BT_KEY_TEXT: bt_json_string(j, k->name, *(char *const *)member); break;
+    case BT_KEY_REAL: member_of(c, k, &v.real, sizeof v.real), bt_json_number(j, k->name, v.real); break;
+    case BT_KEY_INT: member_of(c, k, &v.integer, sizeof v.integer), bt_json_int(j, k->name, v.integer); break;
+    case BT_KEY_BOOL: member_of(c, k, &v.yes, sizeof v.yes), bt_json_bool(j, k->name, v.yes); break;
+    case BT_KEY_CHOICE:
+        member_of(c, k, &v.choice, sizeof v.choice);
+        bt_json_string(j, k->name, k->choices[v.choice]);
+        break;
+    case BT_KEY_TEXT: member_of(c, k, &v.text, sizeof v.text), bt_json_string(j, k->name, v.text); break;
     case BT_KEY_MAP: break;
     case BT_KEY_POINTS: {
-        const double *p = *(double *const *)member;
-        const int n = *(const int *)((const char *)c + k->offset_count);
+        int n;
+        member_of(c, k, &v.points, sizeof v.points);
+        memcpy(&n, (const char *)c + k->offset_count, sizeof n);
         if (!n) {
             bt_json_raw(j, k->name, "null");
             break;
@@ -60,8 +77,8 @@ static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
         bt_json_open(j, k->name, '[');
         for (int i = 0; i < n; i++) {
             bt_json_open(j, NULL, '[');
-            bt_json_number(j, NULL, p[2 * i]);
-            bt_json_number(j, NULL, p[2 * i + 1]);
+            bt_json_number(j, NULL, v.points[2 * i]);
+            bt_json_number(j, NULL, v.points[2 * i + 1]);
             bt_json_close(j, ']');
         }
         bt_json_close(j, ']');

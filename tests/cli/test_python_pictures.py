@@ -195,6 +195,7 @@ def test_the_wheel_has_the_command(towed, tmp_path):
     said = subprocess.run([command, "--version"], capture_output=True, text=True, env=env)
     assert said.stdout == call("--version").stdout, said.stderr
     env |= {"BERGTOW_LIB": str(tmp_path), "PATH": str(command.parent)}  # where it does not call itself
+    env.pop("BERGTOW", None)
     said = subprocess.run([command, "run", "x.yml"], capture_output=True, text=True, env=env)
     assert said.returncode == 4 and "install it with `make install`" in said.stderr
 
