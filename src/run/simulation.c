@@ -544,7 +544,7 @@ bt_status bt_record_check(const char *folder, const char *name, const void *made
 bt_status bt_folder_lock(const char *dir, int *lock)
 {
     bt_errors err = {0};
-    *lock = bt_lock_take(dir, NULL, &err);
+    *lock = bt_lock_take_file(dir, "lock", NULL, &err);
     return reported(*lock >= 0 ? BT_OK : BT_ERR_IO, &err);
 }
 
