@@ -91,7 +91,7 @@ EXTENDED := $(BUILD)/tests/examples/extended
 .DEFAULT_GOAL := all
 .SECONDARY: $(TEST_BIN:=.o) $(RANK_BIN:=.o)
 
-all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
+all: $(BUILD)/bergtow $(BUILD)/libbergtow.so ## build the program and the library (CONFIG=debug, validate, asan)
 
 lib: $(BUILD)/libbergtow.a $(BUILD)/libbergtow.so ## the library: static, and shared for programs and Python
 
@@ -262,15 +262,15 @@ demo: deps-demo ## resistance of an iceberg in 20, 50 and 80 % ice: the answer, 
 	@echo "now the program is built, and the iceberg towed through 15 ice fields: 100 s on two cores"
 	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow ensemble cases/studies/demo.yml -o $(DEMO)
-	$(PYTHON) postproc/report.py $(FIELD) -o $(DEMO)/replay.html
-	$(PYTHON) postproc/plot_resistance.py $(DEMO)/members/* -o $(DEMO)/resistance.png --words
+	build/release/bergtow report $(FIELD) -o $(DEMO)/replay.html
+	build/release/bergtow plot-resistance $(DEMO)/members/* -o $(DEMO)/resistance.png --words
 	@echo "picture of it: $(DEMO)/resistance.png; one field of 80 % with a replay: $(DEMO)/replay.html"
 	@echo "tows that are done are kept; remove $(DEMO) for new ones"
 
 RUN ?=
 report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
 	@[ -n "$(RUN)" ] || { echo "which run? make report RUN=out/demo"; exit 2; }
-	$(PYTHON) postproc/report.py $(RUN)
+	build/release/bergtow report $(RUN)
 
 deps-docs: ## install what make docs needs
 	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_DOCS)'

@@ -11,7 +11,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "postproc"))
 
-from bergtow_read import Run, RunError  # noqa: E402
+from bergtow.errors import RunError  # noqa: E402
+from bergtow.result.run import Run  # noqa: E402
 
 
 class Failed(Exception):

@@ -47,7 +47,7 @@ def main(program, out, with_pdf=True):
     (out / "html/index.html").write_text(HOME)
     print(f"manual: {out / 'html/index.html'}")
     if with_pdf:
-        import pdf
+        from bergtow.reporting import pdf
         sphinx("singlehtml", out, "-D", "html_theme=alabaster", "-D", "html_theme_options.nosidebar=1")
         page = out / "singlehtml/docs/index.html"
         pdf.write(printed(page.read_text(encoding="utf-8"), page.parent), out / "bergtow.pdf", True)

@@ -1,11 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Man pages and completions of bergtow and bergtow-report, made from what these say of themselves.
+"""The man page and the completions of bergtow, made from what it says of itself.
 
     install/from_help.py BERGTOW FOLDER
 
-writes FOLDER/bergtow.1, bergtow.bash, _bergtow (zsh), and the same of bergtow-report. Rejected: texts kept by hand,
-which fall behind the options.
+writes FOLDER/bergtow.1, bergtow.bash and _bergtow (zsh). Rejected: texts kept by hand, which fall behind the options.
 """
 import os
 import re
@@ -40,11 +39,11 @@ class Option:
 
 
 class Command:
-    """What `bergtow NAME --help` says, or a program without commands: usage, a paragraph, options."""
+    """What `bergtow NAME --help` says: usage, a paragraph, options."""
 
-    def __init__(self, program, name="", summary=""):
+    def __init__(self, program, name, summary):
         self.name, self.summary, self.options, about = name, summary, [], []
-        text = said(program, *([name] if name else []), "--help")
+        text = said(program, name, "--help")
         usage, _, rest = text.partition("\n" if text.startswith("Usage") else "\n\n")
         usage = re.sub(r"\s+", " ", usage)
         self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|MAP|RUN|A)\b\S*(?: \[B\])?)$", usage)
@@ -63,7 +62,7 @@ class Command:
 def commands(program):
     """The commands and the program's own options, from `bergtow --help`."""
     text = said(program, "--help")
-    listed = re.findall(r"^  ([a-z]+) +(\S.*)$", text, re.MULTILINE)
+    listed = re.findall(r"^  ([a-z-]+) +(\S.*)$", text, re.MULTILINE)
     own = re.findall(r"^  (--[\w-]+) +(\S.*)$", text, re.MULTILINE)
     codes = text[text.index("Exit codes:"):]
     return [Command(program, *c) for c in listed], own, re.sub(r"\s+", " ", codes).strip()
@@ -80,11 +79,6 @@ def options_of(command):
         arg = f"=\\fI{roff(o.arg)}\\fR" if o.arg else ""
         out += [".TP", ", ".join(f"\\fB{roff(f)}\\fR" for f in o.flags) + arg, roff(o.text)]
     return out
-
-
-#: variables of the environment that the scripts are started by
-OF_SCRIPTS = (("BERGTOW_HOME", "folder that holds postproc/, where the scripts of commands are"),
-              ("PYTHON", "Python that starts these scripts; default /usr/bin/python3"))
 
 
 def terms(pairs):
@@ -105,17 +99,10 @@ def man_page(found, own, codes, version):
         out += options_of(c)
     out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT",
             *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
-                    ("BERGTOW_MPI", "yes or no: start MPI, or not"), *OF_SCRIPTS])]
+                    ("BERGTOW_MPI", "yes or no: start MPI, or not"),
+                    ("BERGTOW_HOME", "folder that holds postproc/, where the Python package is"),
+                    ("PYTHON", "Python of the commands that the package has; default /usr/bin/python3")])]
     return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"
-
-
-def man_page_of_report(report, version):
-    return "\n".join([
-        '.\\" made by install/from_help.py', f'.TH BERGTOW\\-REPORT 1 "" "bergtow {version}" "User Commands"',
-        ".SH NAME", "bergtow\\-report \\- write the report of a run or of an ensemble", ".SH SYNOPSIS",
-        f".B bergtow\\-report\n[\\fIOPTION\\fR...] \\fI{roff(report.operands)}\\fR", ".SH DESCRIPTION",
-        roff(report.about), ".SH OPTIONS", *options_of(report), ".SH ENVIRONMENT", *terms(OF_SCRIPTS),
-        ".SH SEE ALSO", ".BR bergtow (1)", ""])
 
 
 def with_values(found):
@@ -124,26 +111,6 @@ def with_values(found):
     takes_word = sorted({f for c in found for o in c.options if o.arg and not WORDS.get(o.arg) for f in o.flags}
                         - set(takes_file))
     return "|".join(takes_file) or "''", "|".join(takes_word) or "''"  # none, where Python lacks what --help needs
-
-
-def bash_of_report(report):
-    takes_file, takes_word = with_values([report])
-    return f"""# bash completion of bergtow-report, made by install/from_help.py
-_bergtow_report()
-{{
-    local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD - 1]}}
-    COMPREPLY=()
-    case $before in
-    {takes_word}) return ;;
-    {takes_file}) COMPREPLY=($(compgen -f -- "$word")); return ;;
-    esac
-    case $word in
-    -*) COMPREPLY=($(compgen -W '{' '.join(f for o in report.options for f in o.flags)}' -- "$word")) ;;
-    *) COMPREPLY=($(compgen -f -- "$word")) ;;
-    esac
-}}
-complete -o filenames -F _bergtow_report bergtow-report
-"""
 
 
 def bash(found, own):
@@ -177,11 +144,6 @@ def zsh_options(command):
     return out + ["    '*:file:_files'"]
 
 
-def zsh_of_report(report):
-    return "\n".join(["#compdef bergtow-report", "# made by install/from_help.py", "_arguments -s \\",
-                      *zsh_options(report), ""])
-
-
 def zsh(found, own):
     out = ["#compdef bergtow", "# made by install/from_help.py", "local -a commands options", "commands=("]
     out += [f"  '{c.name}:{quoted(c.summary)}'" for c in found] + [")"]
@@ -202,10 +164,6 @@ def main():
     (folder / "bergtow.1").write_text(man_page(found, own, codes, version))
     (folder / "bergtow.bash").write_text(bash(found, own))
     (folder / "_bergtow").write_text(zsh(found, own))
-    report = Command(HERE / "bergtow-report")
-    (folder / "bergtow-report.1").write_text(man_page_of_report(report, version))
-    (folder / "bergtow-report.bash").write_text(bash_of_report(report))
-    (folder / "_bergtow-report").write_text(zsh_of_report(report))
 
 
 if __name__ == "__main__":

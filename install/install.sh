@@ -29,7 +29,7 @@ take_away() {
         [ "$kind" = folder ] || rm -f "$dest$path"
     done <"$kept"
     rm -f "$list"
-    # what Python has made of the scripts
+    # what Python has made of the package
     find "$dest$prefix/share/bergtow" -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
     # the deepest come last in the list
     sed -n 's/^folder //p' "$kept" | tac | while read -r path; do
@@ -71,7 +71,6 @@ put_link() {
 major=${version%%.*}
 [ -z "$dest" ] || mkdir -p "$dest"
 put_file 755 "$build/bergtow" "$prefix/bin/bergtow"
-put_file 755 install/bergtow-report "$prefix/bin/bergtow-report"
 put_file 644 "$build/libbergtow.a" "$prefix/lib/libbergtow.a"
 put_file 755 "$build/libbergtow.so.$version" "$prefix/lib/libbergtow.so.$version"
 put_link "libbergtow.so.$version" "$prefix/lib/libbergtow.so.$major"
@@ -83,11 +82,9 @@ pc=$(mktemp)
 sed "s|@PREFIX@|$prefix|" "$build/share/bergtow.pc" >"$pc"
 put_file 644 "$pc" "$prefix/lib/pkgconfig/bergtow.pc"
 rm -f "$pc"
-for program in bergtow bergtow-report; do
-    put_file 644 "$build/share/$program.1" "$prefix/share/man/man1/$program.1"
-    put_file 644 "$build/share/$program.bash" "$prefix/share/bash-completion/completions/$program"
-    put_file 644 "$build/share/_$program" "$prefix/share/zsh/site-functions/_$program"
-done
+put_file 644 "$build/share/bergtow.1" "$prefix/share/man/man1/bergtow.1"
+put_file 644 "$build/share/bergtow.bash" "$prefix/share/bash-completion/completions/bergtow"
+put_file 644 "$build/share/_bergtow" "$prefix/share/zsh/site-functions/_bergtow"
 find postproc -type f ! -name '*.pyc' ! -path '*/build/*' ! -path '*.egg-info/*' | sort >"$made.scripts"
 while read -r script; do
     put_file 644 "$script" "$prefix/share/bergtow/$script"

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Puts tests/ on the path, so that the tests of every folder find harness.py, and says early that the program is
+"""Puts tests/ and the Python package on the path, for the tests of every folder, and says early that the program is
 missing."""
 import os
+import sys
 
 import harness
 import pytest
+
+sys.path.insert(0, str(harness.ROOT / "postproc"))
 
 
 def pytest_configure(config):
@@ -26,3 +29,11 @@ def pytest_collection_modifyitems(items):
 def library():
     """The shared library, which the Python package loads."""
     harness.make("lib")
+
+
+@pytest.fixture
+def look():
+    """Settings of matplotlib as a command has them, for figures that a test draws itself."""
+    from bergtow.plot import style  # not before: most tests draw nothing
+    with style.look():
+        yield

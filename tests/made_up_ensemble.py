@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: MIT
 """An ensemble's folder with numbers of the test's own, of the layout that src/run/ensemble_file.c writes."""
+import ctypes
 import json
 import re
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "postproc"))
-
-import soundness  # noqa: E402
 
 FINISHED, FAILED, WAITING = 1, 2, 0
 UNITS = {"ice.concentration": "1", "tow.speed": "m/s", "ice.thickness": "m", "ice.friction": "1"}
@@ -24,6 +21,18 @@ VERDICTS = ("steady", "not steady", "too short")
 #: (code, meaning) of every warning, as the table of the program has them
 CODES = re.findall(r'ROW\(\w+,\s*"(\w+)",\s*"[^"]*",\s*"([^"]*)"\)', (
     Path(__file__).resolve().parents[1] / "src/case/warning.h").read_text(encoding="utf-8").replace("\\\n", ""))
+
+
+class _Hash(ctypes.Structure):
+    _fields_ = [("low", ctypes.c_uint64), ("high", ctypes.c_uint64)]
+
+
+def digest(raw):
+    """XXH3, 128 bits, in hexadecimal digits."""
+    function = ctypes.CDLL("libxxhash.so.0").XXH3_128bits
+    function.restype, function.argtypes = _Hash, [ctypes.c_char_p, ctypes.c_size_t]
+    found = function(raw, len(raw))
+    return f"{found.high:016x}{found.low:016x}"
 
 
 def note(code, text="", **values):
@@ -136,13 +145,18 @@ def seal(path, name=None):
     """The seal of a file without one, as src/base/checksum.h has it. name: "checkpoint", "result", "ensemble"."""
     raw, header = path.read_bytes(), (Path(__file__).resolve().parents[1] / "src/base/checksum.h").read_text()
     kind = re.search(rf'"({name or path.stem} \d+)"', header)[1]
-    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw)}\n".encode()
-    path.write_bytes(raw + text.ljust(soundness.SEAL_BYTES, b"\0"))
+    text = f"bergtow sealed file\nkind: {kind}\nbytes: {len(raw)}\nxxh128: {digest(raw)}\n".encode()
+    path.write_bytes(raw + text.ljust(128, b"\0"))
 
 
-def record(folder, study):
-    """The record of a finished member."""
-    (folder / "finished").write_text(soundness.record(folder, folder.name, study.encode()))
+def record(folder, study, name=None):
+    """The record of a finished member, as src/run/ensemble_record.h has it."""
+    lines = ["bergtow finished member 1", f"name: {name or folder.name}",
+             f"study: {digest(study.encode())}"]
+    for file in ("summary.json", "result.h5", "case.resolved.yml"):
+        raw = (folder / file).read_bytes()
+        lines.append(f"{file}: {len(raw)} bytes, xxh128 {digest(raw)}")
+    (folder / "finished").write_text("\n".join(lines) + "\n")
 
 
 def write(folder, members, title="made up", sampling="grid"):

@@ -9,8 +9,7 @@ import sys
 import h5py
 from harness import ROOT, TOW, changed
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import bergtow  # noqa: E402
+import bergtow
 
 SHORT = changed(TOW, run__duration=6)
 LINE = changed(SHORT, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, tow__speed=0.6, body__x=4)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Scripts of Python in copies of a process that has loaded their libraries: half of what most calls of a script cost is
-the start of Python, HDF5, matplotlib and scipy. What the process of the tests holds is not in the copies."""
+"""Commands of the Python package, and scripts, in copies of a process that has loaded their libraries: half of what
+most calls cost is the start of Python, HDF5, matplotlib and scipy. What the process of the tests holds is not in the
+copies."""
 import functools
 import gc
 import importlib
@@ -13,7 +14,7 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-for library in "h5py", "jinja2", "matplotlib.pyplot", "scipy.stats", "yaml":
+for library in "h5py", "jinja2", "matplotlib.figure", "scipy.stats", "yaml":
     importlib.import_module(library)
 if multiprocessing.current_process().name == "MainProcess":
     gc.freeze()  # else each copy would touch, and so copy, all of its memory
@@ -42,9 +43,13 @@ def run(words, cwd, env, out, err):
     os.chdir(cwd)
     os.environ.clear()
     os.environ.update(env)
-    sys.argv = words
-    sys.path = [os.path.dirname(words[0]), *(p for p in sys.path if p and not p.startswith(os.path.dirname(HERE)))]
-    runpy.run_path(words[0], run_name="__main__")
+    others = [p for p in sys.path if p and not p.startswith(os.path.dirname(HERE))]
+    if words[0].endswith(".py"):
+        sys.argv, sys.path = words, [os.path.dirname(words[0]), *others]
+        runpy.run_path(words[0], run_name="__main__")
+    else:
+        sys.argv, sys.path = ["bergtow", *words], [os.path.join(os.path.dirname(HERE), "postproc"), *others]
+        runpy.run_module("bergtow", run_name="__main__", alter_sys=True)
 
 
 def called(words, cwd, env, timeout):

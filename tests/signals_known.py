@@ -6,15 +6,11 @@ exp(-rate(z)) is the largest eigenvalue of its transitions within (-inf, z]: fou
 exceeded once in T steps, by clusters, where T rate(z) = 1.
 """
 import functools
-import sys
-from pathlib import Path
 
 import numpy as np
 from scipy import optimize, signal, stats
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "postproc"))
-
-import stat_load  # noqa: E402
+from bergtow.stats import load as stat_load
 
 CELLS, TURNS = 400, 200
 

@@ -15,9 +15,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "cases")]
 
-import command  # noqa: E402
-import plot_resistance  # noqa: E402
-from bergtow_read import Run  # noqa: E402
+from bergtow import writing  # noqa: E402
+from bergtow.cli import command  # noqa: E402
+from bergtow.plot import resistance as plot_resistance  # noqa: E402
+from bergtow.plot import style  # noqa: E402
+from bergtow.result.run import Run  # noqa: E402
 from runs import Failed, run  # noqa: E402
 
 CONCENTRATIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95)
@@ -32,7 +34,7 @@ def concentration(a):
     points = [plot_resistance.read(folder) for folder in folders]
     text = plot_resistance.table(points)
     (a.out / "resistance.md").write_text(text + "\n", encoding="utf-8")
-    command.save(plot_resistance.draw(points), a.out / "resistance.png", force=True)
+    writing.save(plot_resistance.draw(points), a.out / "resistance.png", force=True)
     print(
         f"\nMean ice resistance; in brackets simulated / estimate; * an estimate outside the range it is meant "
         f"for\n\n{text}\n\n{a.out / 'resistance.md'}"
@@ -103,6 +105,7 @@ def arguments(argv):
     return a
 
 
+@style.look()
 def main(argv=None):
     a = arguments(argv)
     a.out.mkdir(parents=True, exist_ok=True)
@@ -114,4 +117,4 @@ def main(argv=None):
 
 
 if __name__ == "__main__":
-    command.guarded(main)
+    command.guarded(Path(__file__).name, main)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "postproc"))
 from matplotlib.ticker import LogLocator, NullLocator  # noqa: E402
-from style import FAINT, INK, plt  # noqa: E402
+from bergtow.plot import style  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
 
 # Okabe & Ito
 COLOURS = {"tow-80": "#56b4e9", "tow-95": "#0072b2", "compression-80": "#e69f00", "compression-95": "#d55e00"}
@@ -64,7 +65,7 @@ def lines(ax, rows, column, wanted):
     ax.set_xlabel("floes")
     ax.grid(True)
     if not drawn:
-        ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", color=FAINT)
+        ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", color=style.FAINT)
     return drawn
 
 
@@ -100,14 +101,15 @@ def phase_bars(ax, rows):
 def legend(fig, rows):
     scenes = dict.fromkeys(r["scene"] for r in rows)
     configs = dict.fromkeys(config(r) for r in rows)
-    handles = [plt.Line2D([], [], color=COLOURS[s], linewidth=3, label=s) for s in scenes]
-    handles += [plt.Line2D([], [], color=INK, label=name_of(*c), **line_of(*c)) for c in configs]
+    handles = [Line2D([], [], color=COLOURS[s], linewidth=3, label=s) for s in scenes]
+    handles += [Line2D([], [], color=style.INK, label=name_of(*c), **line_of(*c)) for c in configs]
     fig.legend(handles=handles, loc="upper center", ncols=len(handles), bbox_to_anchor=(0.5, 0.995))
 
 
+@style.look()
 def draw(table, picture):
     rows = read(table)
-    fig, axes = plt.subplots(2, 3, figsize=(15, 9))
+    fig, axes = style.subplots(2, 3, figsize=(15, 9))
     every, several, one = (lambda c: True), (lambda c: c[0] * c[1] > 1), (lambda c: c[0] * c[1] == 1)
     ax = axes[0, 0]
     lines(ax, rows, "ns_per_floe_step", every)
@@ -115,7 +117,7 @@ def draw(table, picture):
     ax.set_title("Cost of a floe and step, ns")
     ax = axes[0, 1]
     lines(ax, rows, "speedup", several)
-    ax.axhline(1, color=FAINT, linewidth=0.8)
+    ax.axhline(1, color=style.FAINT, linewidth=0.8)
     zero_to(ax, 2.1)
     ax.set_title("Strong scaling: speed-up over one core")
     ax = axes[0, 2]
@@ -136,7 +138,6 @@ def draw(table, picture):
     legend(fig, rows)
     fig.tight_layout(rect=(0, 0, 1, 0.95))
     fig.savefig(picture)
-    plt.close(fig)
 
 
 if __name__ == "__main__":

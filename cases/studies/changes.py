@@ -17,16 +17,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
-import command  # noqa: E402
-import style  # noqa: E402
-import text_table  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
-from ensemble_read import Ensemble, reading, short_key, worded  # noqa: E402
-from plot_variants import relative_change  # noqa: E402
-from stat_mean import t_interval  # noqa: E402
-from text_table import number  # noqa: E402
+from bergtow import arguments, writing  # noqa: E402
+from bergtow.cli import command  # noqa: E402
+from bergtow.plot import style  # noqa: E402
+from bergtow import table as text_table  # noqa: E402
+from bergtow.errors import RunError  # noqa: E402
+from bergtow.result.members import Members, reading, short_key, worded  # noqa: E402
+from bergtow.plot.variants import relative_change  # noqa: E402
+from bergtow.stats.mean import t_interval  # noqa: E402
+from bergtow.table import number  # noqa: E402
 
-import matplotlib.pyplot as plt  # noqa: E402
 
 LINES = ((style.INK, "-"), (style.ICE, "-"), (style.ICE, "--"), (style.TOW, "-"), (style.TOW, "--"), (style.DRAG, "-"),
          (style.INERTIA, "-"), (style.CORIOLIS, "-"))
@@ -35,7 +35,7 @@ LINES = ((style.INK, "-"), (style.ICE, "-"), (style.ICE, "--"), (style.TOW, "-")
 def named(text):
     """(name, ensemble) of NAME=FOLDER or FOLDER."""
     name, given, folder = text.rpartition("=")
-    return (name if given else Path(folder).name), Ensemble(folder)
+    return (name if given else Path(folder).name), Members(folder)
 
 
 def fields(e, c):
@@ -132,7 +132,7 @@ def draw(studies, of):
     """Means and their changes over what was varied; of: rows() of each study."""
     base = studies[0][1]
     x, order, axis, texts = places(base)
-    figure, (above, below) = plt.subplots(2, 1, figsize=(8.4, 8.2), sharex=True, height_ratios=(3, 2))
+    figure, (above, below) = style.subplots(2, 1, figsize=(8.4, 8.2), sharex=True, height_ratios=(3, 2))
     figure.subplots_adjust(left=0.11, right=0.97, top=0.9, bottom=0.08, hspace=0.08)
     factor, unit = text_table.scale(np.concatenate([r[:, 0] for r in of]), "N")
     shift = 0.004 * max(np.ptp(x), 1.0) * (np.arange(len(studies)) - (len(studies) - 1) / 2)
@@ -157,16 +157,17 @@ def draw(studies, of):
     return figure
 
 
+@style.look()
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("base", metavar="BASE")
     p.add_argument("others", metavar="OTHER", nargs="+")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("changes.png"))
-    command.add_force(p)
+    arguments.add_force(p)
     a = p.parse_args()
-    if a.output.suffix.lower() not in command.PICTURES:
-        p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(command.PICTURES)}")
-    command.may_write(a.output, a.force)
+    if a.output.suffix.lower() not in writing.PICTURES:
+        p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(writing.PICTURES)}")
+    writing.may_write(a.output, a.force)
     studies = [named(text) for text in (a.base, *a.others)]
     if len(studies) > len(LINES):
         p.error(f"at most {len(LINES)} studies")
@@ -174,8 +175,8 @@ def main():
         must_match(studies[0][1], e)
     of = [rows(studies[0][1], e) for _, e in studies]
     report(studies, of)
-    command.save(draw(studies, of), a.output, a.force)
+    writing.save(draw(studies, of), a.output, a.force)
 
 
 if __name__ == "__main__":
-    command.guarded(main)
+    command.guarded(Path(__file__).name, main)

@@ -8,15 +8,17 @@ Arrest: no block passes the gap over the last 10 blocks of the boom's way, while
 passes when its centre crosses the middle of the plate, between two frames.
 """
 import json
+from pathlib import Path
 
 from points import ended, every, parser, wilson
 
-import command  # points has set the path
-import style
-from bergtow_read import Run
+from bergtow import writing
+from bergtow.cli import command  # points has set the path
+from bergtow.plot import style
+from bergtow.result.run import Run
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import Rectangle
 from scipy.optimize import minimize
 
 BLOCK, SPEED, START, WAY = 0.1, 0.1, 0.3, 60  # m, m/s, m, blocks: as in arching.yml
@@ -213,7 +215,7 @@ def draw_map(ax, rows):
         i, j = ratios.index(row["ratio"]), mus.index(row["friction"])
         k, n = sum(r["arrest"] for r in row["runs"]), len(row["runs"])
         low, high = wilson(k, n)
-        ax.add_patch(plt.Rectangle((i - 0.5, j - 0.5), 1, 1, fc=style.FORCE_MAP(k / n), ec=style.PAPER))
+        ax.add_patch(Rectangle((i - 0.5, j - 0.5), 1, 1, fc=style.FORCE_MAP(k / n), ec=style.PAPER))
         ink = style.PAPER if k / n > 0.5 else style.INK
         ax.text(i, j, f"{k} of {n}\n{low:.2f}–{high:.2f}", ha="center", va="center", fontsize=9, color=ink)
     limit = sum(r <= OBSERVED for r in ratios) - 0.5
@@ -262,7 +264,7 @@ def draw_arch(ax, folder):
 
 
 def draw(out, parts):
-    figure, axes = plt.subplots(1, 3, figsize=(15, 4.9), gridspec_kw={"width_ratios": (1.25, 1.1, 0.9)})
+    figure, axes = style.subplots(1, 3, figsize=(15, 4.9), gridspec_kw={"width_ratios": (1.25, 1.1, 0.9)})
     draw_map(axes[0], parts["map"])
     draw_concentration(axes[1], parts["concentration"])
     arched = next((f"map-r0.15-f{row['friction']}-s{i + 1}" for row in parts["map"] if row["ratio"] == 0.15
@@ -291,10 +293,11 @@ def report(out):
     (out / "arching.md").write_text(text + "\n", encoding="utf-8")
     print(f"\n{text}")
     if {"map", "concentration"} <= parts.keys():
-        command.save(draw(out, parts), out / "arching.png", force=True)
+        writing.save(draw(out, parts), out / "arching.png", force=True)
 
 
 @ended
+@style.look()
 def main(argv=None):
     p = parser("Arching of square blocks at a gap in a boom.", "arching", 10)
     p.add_argument("--part", choices=PARTS, nargs="+", default=PARTS)
@@ -305,4 +308,4 @@ def main(argv=None):
 
 
 if __name__ == "__main__":
-    command.guarded(main)
+    command.guarded(Path(__file__).name, main)

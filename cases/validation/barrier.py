@@ -11,14 +11,15 @@ the form of Janssen 1895 for silos. With F_0 = tau phi B L, the drag on the whol
 x = L / l: one unknown, l. L is that of the packed cover.
 """
 import json
+from pathlib import Path
 
 from points import ended, every, parser
 
-import command  # points has set the path
-import style
-from bergtow_read import Run
+from bergtow import writing
+from bergtow.cli import command  # points has set the path
+from bergtow.plot import style
+from bergtow.result.run import Run
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -158,7 +159,7 @@ def table(rows, found):
 
 def draw(rows, found):
     """Collapse of F / F_0 over L / l, length scale over width, and the load of covers that raft."""
-    figure, axes = plt.subplots(1, 3, figsize=(14, 4.7))
+    figure, axes = style.subplots(1, 3, figsize=(14, 4.7))
     colours = dict(zip(sorted({width for width, _ in CHANNELS}), (style.ICE, style.TOW, style.DRAG, style.INERTIA)))
     for width, mu, scale, draws in found:
         chosen = [r for r in rows if (r["width"], r["friction"], r["kappa"]) == (width, mu, 0)]
@@ -193,6 +194,7 @@ def draw(rows, found):
 
 
 @ended
+@style.look()
 def main(argv=None):
     a = parser("Load of an ice cover on a barrier in a channel.", "barrier", 6).parse_args(argv)
     todo = jobs(a.fields)
@@ -202,11 +204,11 @@ def main(argv=None):
     found = fits(rows)
     text = table(rows, found)
     (a.out / "barrier.md").write_text(text + "\n", encoding="utf-8")
-    command.save(draw(rows, found), a.out / "barrier.png", force=True)
+    writing.save(draw(rows, found), a.out / "barrier.png", force=True)
     print(f"\n{text}\n\nsteps not converged: {sum(r['unconverged_steps'] for r in rows)} of "
           f"{sum(r['n_steps'] for r in rows)}; load in the second half of the window against the first: "
           f"{min(r['drift'] for r in rows):+.2%} to {max(r['drift'] for r in rows):+.2%}")
 
 
 if __name__ == "__main__":
-    command.guarded(main)
+    command.guarded(Path(__file__).name, main)

@@ -10,17 +10,16 @@ assumption at a time, at the friction of ship.yml.
 """
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import nrc_outlines
-from points import ROOT, ended, every, parser
+from points import ended, every, parser
 
-import command  # points has set the path
-import style
-from bergtow_read import Run
+from bergtow import writing
+from bergtow.cli import command  # points has set the path
+from bergtow.plot import style
+from bergtow.result.run import Run
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import t as student
 
@@ -72,7 +71,7 @@ def jobs_of_map(a):
     for name, turned in (("there", rings), ("back", [[MAP_LENGTH, 0.0] - ring for ring in rings])):
         raw, floes = a.out / f"{name}-as-read.geojson", a.out / f"{name}.geojson"
         nrc_outlines.write(turned, raw)
-        subprocess.run([sys.executable, ROOT / "postproc/outlines.py", raw, "-o", floes, "--centre", "0,0", "--force"],
+        subprocess.run([a.bergtow, "outlines", raw, "-o", floes, "--centre", "0,0", "--force"],
                        check=True, stdout=subprocess.DEVNULL)
         keys = {"ice__outlines": floes.resolve(), "ice__nonconvex": "split", "domain__length": f"{MAP_LENGTH} m",
                 "domain__width": f"{MAP_WIDTH} m", "ice__seed": 1}
@@ -110,7 +109,7 @@ def table(points):
 
 def draw(points, groups):
     """The band over friction, and the other assumptions beside it."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 4.8), gridspec_kw={"width_ratios": (1.5, 1)})
+    figure, (left, right) = style.subplots(1, 2, figsize=(11.5, 4.8), gridspec_kw={"width_ratios": (1.5, 1)})
     band = [points[f"friction {mu:.2f}"] for mu in FRICTIONS]
 
     def of(key):
@@ -144,6 +143,7 @@ def draw(points, groups):
 
 
 @ended
+@style.look()
 def main(argv=None):
     p = parser("Blind prediction of a ship model's resistance in plastic floes.", "ship", 20)
     p.add_argument("--map", type=Path, metavar="FILE", help="demo_NRC_OEB_data.pkl: the runs in the ice of this map")
@@ -161,11 +161,11 @@ def main(argv=None):
     (a.out / f"{name}.json").write_text(json.dumps(groups), encoding="utf-8")
     (a.out / f"{name}.md").write_text(text + "\n", encoding="utf-8")
     if not a.map:
-        command.save(draw(points, groups), a.out / "ship.png", force=True)
+        writing.save(draw(points, groups), a.out / "ship.png", force=True)
     print(f"\n{text}\n\nsteps not converged: {sum(p['unconverged'] for p in points.values())}")
     if not a.map:
         print("estimates that hold:", groups["friction 0.15"][0]["estimates"])
 
 
 if __name__ == "__main__":
-    command.guarded(main)
+    command.guarded(Path(__file__).name, main)

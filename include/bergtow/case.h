@@ -296,6 +296,8 @@ bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
 /// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
+/// One JSON object {"section.key": value}, in SI units, null where a key has no value. Caller frees.
+char *bt_case_resolved_json(const bt_case *c);
 #define BT_CASE_RESOLVED_HEAD                                                                                          \
     "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n"
 

@@ -160,19 +160,43 @@ int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room
 /// Texts of the last call that failed, one a line; valid until the next call. "" = none.
 const char *bt_last_error(void);
 
-/// Read and check a case alone (path, text, set): every key with its value in SI units, as YAML. Release with
-/// bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved);
+/// Read and check a case alone (path, text, set): every key with its value in SI units, as a case file (resolved) and
+/// as one JSON object {"section.key": value} (values; angles in radians, null where a key has no value). Release both
+/// with bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved, char **values);
 
-/// The case of a simulation, as bt_case_check_text gives it; of one that goes on, that of its checkpoint. Release with
-/// bt_release.
+/// The case of a simulation, as `resolved` of bt_case_check_text; of one that goes on, that of its checkpoint. Release
+/// with bt_release.
 char *bt_simulation_case(const bt_simulation *s);
 
-/// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json); NULL for another word. Release
-/// with bt_release.
+/// What a file holds, by its keys: "case", "study", or "" of any other and of one that cannot be read.
+const char *bt_file_holds(const char *path);
+
+/// Read a number with a unit as in a case file; unit: SI symbol of its kind, "" for plain numbers. Errors:
+/// BT_ERR_USAGE.
+bt_status bt_number_read(const char *text, const char *unit, double *value);
+
+/// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json), or "limits": the numbers by which
+/// the program judges windows, domains and maps. NULL for another word. Release with bt_release.
 char *bt_list_json(const char *what);
 
-/// Release a text that one of these three has given. NULL is ignored.
+/// Are the bytes of a sealed file those that were written? kind: "result", "ensemble", "field" or "checkpoint". Errors:
+/// BT_ERR_CASE, it is damaged, or no such file of this version; BT_ERR_IO; BT_ERR_USAGE, another kind.
+bt_status bt_seal_check(const char *path, const char *kind);
+
+/// The record of a run that has just ended in a folder: what its files are. name, and n bytes of what it was made by:
+/// whose it is. Errors: BT_ERR_IO, also where the files are not what a whole run leaves.
+bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n);
+
+/// Are the files of the folder those of its record, and is that of this name and bytes? Errors: BT_ERR_CASE, they are
+/// missing or changed; BT_ERR_IO.
+bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n);
+
+/// One process at a time in a folder of many runs: the lock DIR/lock holds until the descriptor *lock is closed here and
+/// in every process that has inherited it. Errors: BT_ERR_IO, which names the process that has it.
+bt_status bt_folder_lock(const char *dir, int *lock);
+
+/// Release a text that one of these has given. NULL is ignored.
 void bt_release(char *text);
 
 /// "0.1.0"

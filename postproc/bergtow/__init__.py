@@ -16,20 +16,24 @@ import sys as _sys
 try:
     __import__("numpy")
 except ImportError:
-    raise ImportError(f"bergtow needs numpy, which {_sys.executable} (Python {_sys.version.split()[0]}) lacks; install "
-                      f"python3-numpy (Debian) or `{_sys.executable} -m pip install numpy`, or use /usr/bin/python3"
-                      ) from None
-from ._library import BergtowError, CaseError, library_path, start_mpi
+    _text = (f"bergtow needs numpy, which {_sys.executable} (Python {_sys.version.split()[0]}) lacks; install "
+             f"python3-numpy (Debian) or `{_sys.executable} -m pip install numpy`, or use /usr/bin/python3")
+    if _sys.argv[:1] != ["-m"]:
+        raise ImportError(_text) from None
+    print(f"bergtow: {_text}", file=_sys.stderr)  # python3 -m bergtow: a command ends with a line and its exit code
+    raise SystemExit(4) from None
+from ._library import library_path, start_mpi
 from .case import Case, quantities
-from .ensemble import Ensemble
+from .errors import BergtowError, CaseError
 from .force import Bodies, Force
-from .maps import Outlines, outlines
-from .pictures import (Picture, plot_chains, plot_ensemble, plot_field, plot_force, plot_impacts, plot_resistance,
-                       report, statistics)
-from .results import Result, open_result
+from .functions import (Outlines, Picture, budget, capability, converge, design, outlines, plot_chains, plot_ensemble,
+                        plot_field, plot_force, plot_impacts, plot_resistance, report, statistics)
+from .result.dataset import Result, open_result
 from .simulation import Simulation, run
+from .study.ensemble import Ensemble
 
 __version__ = "0.1.0"
 __all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Force", "Outlines", "Picture", "Result",
-           "Simulation", "library_path", "open_result", "outlines", "plot_chains", "plot_ensemble", "plot_field",
-           "plot_force", "plot_impacts", "plot_resistance", "quantities", "report", "run", "start_mpi", "statistics"]
+           "Simulation", "budget", "capability", "converge", "design", "library_path", "open_result", "outlines",
+           "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
+           "report", "run", "start_mpi", "statistics"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import functools
+import json
 import os
 import threading
 from collections.abc import Callable
@@ -15,26 +16,15 @@ from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int64, c_size_t
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .errors import CASE, IO, OK, USAGE, BergtowError, CaseError
+
 if TYPE_CHECKING:
     from .case import Case
 
 SONAME = "libbergtow.so.0"
-OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 LOADS = 10  # BT_APPLIED_NUMBERS
 CONTACT_COLUMNS = 12  # BT_CONTACT_COLUMNS
 MOST_THREADS = 1024  # BT_MOST_THREADS
-
-
-class BergtowError(Exception):
-    """A call of the library that failed. status: the exit code that the command `bergtow` ends with."""
-
-    def __init__(self, text: str, status: int = USAGE) -> None:
-        super().__init__(text)
-        self.status = status
-
-
-class CaseError(BergtowError, ValueError):
-    """A case that is refused; the text has one line for each error, with key and remedy."""
 
 
 class Options(ctypes.Structure):
@@ -55,6 +45,12 @@ class Applied(ctypes.Structure):
                 ("velocity", POINTER(c_double)), ("mass", POINTER(c_double)), ("inertia", POINTER(c_double)),
                 ("load", POINTER(c_double)), ("time", c_double), ("dt", c_double), ("water", c_double * 2),
                 ("air", c_double * 2), ("towed", c_int64)]
+
+
+class Mean(ctypes.Structure):
+    """bt_mean: of a correlated series, evenly spaced; its 95 % interval, correlation time and independent samples."""
+    _fields_ = [("mean", c_double), ("sd", c_double), ("se", c_double), ("low", c_double), ("high", c_double),
+                ("tau", c_double), ("n_eff", c_double), ("n", c_int64)]
 
 
 class Status(c_int):
@@ -88,7 +84,14 @@ _SIGNATURES = {
     "bt_simulation_progress": (c_void_p, c_void_p),
     "bt_simulation_case": (c_void_p, c_void_p),
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
-    "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p)),
+    "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p), POINTER(c_void_p)),
+    "bt_file_holds": (c_char_p, c_char_p),
+    "bt_folder_lock": (Status, c_char_p, POINTER(c_int)),
+    "bt_seal_check": (Status, c_char_p, c_char_p),
+    "bt_record_keep": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
+    "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
+    "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
+    "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),
@@ -211,6 +214,17 @@ def take_text(address: int | None) -> str:
     text = ctypes.string_at(address).decode()
     library().bt_release(address)
     return text
+
+
+@functools.cache
+def listed(what: str) -> dict[str, Any]:
+    """bt_list_json: "keys", "quantities" or "limits"."""
+    return json.loads(take_text(library().bt_list_json(what.encode())))
+
+
+def limit(name: str) -> Any:
+    """A number by which the program judges windows, domains and maps."""
+    return listed("limits")[name]
 
 
 def id_of_towed(towed: int | None) -> int:

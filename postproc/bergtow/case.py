@@ -2,6 +2,7 @@
 """Cases: what a simulation depends on, as the keys of a case file, each checked by the library."""
 from __future__ import annotations
 
+import copy
 import ctypes
 import functools
 import html
@@ -13,19 +14,18 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from typing import Any
 
 from . import _library
-from ._library import CaseError
+from .errors import CASE, CaseError
 
 
 @functools.cache
 def _keys() -> dict[str, dict[str, Any]]:
     """{key: what the library knows of it}."""
-    listed = json.loads(_library.take_text(_library.library().bt_list_json(b"keys")))
-    return {key["name"]: key for key in listed["keys"]}
+    return {key["name"]: key for key in _library.listed("keys")["keys"]}
 
 
 def quantities() -> dict[str, Any]:
     """The numbers that a run leaves: series, keys of the summary, estimates, with units and meaning."""
-    return json.loads(_library.take_text(_library.library().bt_list_json(b"quantities")))
+    return copy.deepcopy(_library.listed("quantities"))
 
 
 #: units of values as they are read, where a case file takes a bare number for something else
@@ -88,19 +88,9 @@ def here() -> str:
         return ""
 
 
-def _parsed(text: str, kind: str) -> Any:
-    """A value of the resolved case, in SI units."""
-    if text == "none" and kind != "choice":
-        return None
-    if text.startswith('"'):
-        return json.loads(text)
-    if text.startswith("["):
-        return json.loads(re.sub(r"(?<=[\d.]) [^\W\d][^,\]]*", "", text))  # without units
-    if kind == "integer":
-        return int(text)
-    if kind == "real":
-        return float(text.split(" ")[0])
-    return text == "true" if kind == "bool" else text
+def _as_real(value: Any) -> Any:
+    """JSON has no point in whole numbers."""
+    return [_as_real(v) for v in value] if isinstance(value, list) else value if value is None else float(value)
 
 
 class Case(MutableMapping[str, Any]):
@@ -135,12 +125,14 @@ class Case(MutableMapping[str, Any]):
         return cls(path, values, text=text)
 
     def _resolve(self, overrides: dict[str, str]) -> None:
-        address = ctypes.c_void_p()
+        address, listed = ctypes.c_void_p(), ctypes.c_void_p()
         before, self.overrides = self.overrides, overrides
         try:
-            _library.library().bt_case_check_text(ctypes.byref(_library.options(self)), ctypes.byref(address))
+            _library.library().bt_case_check_text(ctypes.byref(_library.options(self)), ctypes.byref(address),
+                                                  ctypes.byref(listed))
             resolved = _library.take_text(address.value)
-            values = self._read(resolved)
+            values = {key: _as_real(value) if _keys()[key]["type"] in ("real", "points") else value
+                      for key, value in json.loads(_library.take_text(listed.value)).items()}
         except Exception:
             self.overrides = before
             raise
@@ -157,23 +149,8 @@ class Case(MutableMapping[str, Any]):
         other._resolve(other.overrides)
         if other.resolved != self.resolved:
             raise CaseError(f"{self.path or 'case'}: a file that it builds on (base) has changed since the case was "
-                            "read; make the Case again", _library.CASE)
+                            "read; make the Case again", CASE)
         return other
-
-    @staticmethod
-    def _read(text: str) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        path: list[str] = []
-        for line in text.splitlines():
-            match = re.match(r'( *)([\w]+):(?: ("(?:\\.|[^"\\])*"|\[.*\]|.*?))?(?:  # .*)?$', line)
-            if not match:
-                continue
-            del path[len(match[1]) // 2:]
-            path.append(match[2])
-            key = ".".join(path)
-            if match[3] and key in _keys():
-                values[key] = _parsed(match[3].strip(), _keys()[key]["type"])
-        return values
 
     def __getitem__(self, key: str) -> Any:
         if key not in _keys():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _library
+from .errors import OK, BergtowError
 from ._interrupts import held
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ class Forces:
         self.raised: BaseException | None = None
         for name in self.functions:
             if name in self._owner:
-                raise _library.BergtowError(f"force {name}: belongs to a simulation that has not ended; end it, or "
+                raise BergtowError(f"force {name}: belongs to a simulation that has not ended; end it, or "
                                             "choose another name")
         done = []
         try:
@@ -154,8 +155,8 @@ class Forces:
         status = _library.library().bt_force_apply(*texts, callback, None, ctypes.byref(err))
         text = "\n".join(err.text[k].decode() for k in range(err.n))
         _library.library().bt_errors_free(ctypes.byref(err))
-        if status != _library.OK:
-            raise _library.BergtowError(text, status)
+        if status != OK:
+            raise BergtowError(text, status)
 
     @classmethod
     def _call(cls, name: str, a: Any) -> int:
@@ -185,7 +186,7 @@ class Forces:
             before, Forces.stepping = Forces.stepping, self
             try:
                 yield
-            except _library.BergtowError:
+            except BergtowError:
                 raised, self.raised = self.raised, None
                 if raised is not None:
                     raise raised from None

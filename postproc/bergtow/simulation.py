@@ -17,10 +17,10 @@ import numpy as np
 
 from . import _library
 from ._interrupts import held
-from ._library import BergtowError
+from .errors import SIGNAL, BergtowError
 from .case import Case, here
 from .force import Force, Forces
-from .results import Result
+from .result.dataset import Result
 
 _KINDS = {"place": (0, 3), "velocity": (1, 3), "mass": (2, 2), "inertia": (3, 1), "area": (4, 1), "radius": (5, 1),
           "thickness": (6, 1), "motion": (7, 1), "drag": (8, 5)}
@@ -171,7 +171,7 @@ class Simulation:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
         if self._address is None:
             return
-        if kind is None or getattr(error, "status", None) == _library.SIGNAL:  # asked to stop: nothing is lost
+        if kind is None or getattr(error, "status", None) == SIGNAL:  # asked to stop: nothing is lost
             self.end()
         else:
             self.drop()

@@ -14,7 +14,7 @@ int bt_cmd_check(int argc, char **argv);
 int bt_cmd_field(int argc, char **argv);
 int bt_cmd_estimate(int argc, char **argv);
 int bt_cmd_ensemble(int argc, char **argv);
-int bt_cmd_script(int argc, char **argv);
+int bt_cmd_python(int argc, char **argv);
 int bt_cmd_resume(int argc, char **argv);
 int bt_cmd_diff(int argc, char **argv);
 

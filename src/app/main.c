@@ -30,18 +30,32 @@ static const struct {
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
      true, true},
     {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
-     bt_cmd_script, false, false},
+     bt_cmd_python, false, false},
     {"budget", "find out how much of the scatter is of the fields, of each assumed value, of the computation",
-     bt_cmd_script, false, false},
-    {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false,
-     false},
-    {"design", "from a case or a study to the report of the design tow force, as a page and as PDF", bt_cmd_script,
-     false, false},
-    {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines", bt_cmd_script,
-     false, false},
+     bt_cmd_python, false, false},
+    {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it",
+     bt_cmd_python, false, false},
+    {"design", "from a case or a study to the report of the design tow force, as a page and as PDF",
+     bt_cmd_python, false, false},
+    {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines",
+     bt_cmd_python, false, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false, false},
+    {"report", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF",
+     bt_cmd_python, false, false},
+    {"statistics", "statistics of an ensemble: design force, loads, intervals, in tables and files",
+     bt_cmd_python, false, false},
+    {"contents", "list what the folder of a run holds", bt_cmd_python, false, false},
+    {"film", "make a film of a run", bt_cmd_python, false, false},
+    {"plot-force", "draw the forces of a run against time", bt_cmd_python, false, false},
+    {"plot-field", "draw the ice field before, during and after the tow", bt_cmd_python, false, false},
+    {"plot-impacts", "draw the loads around the hull by panel, and the exceedance of peaks",
+     bt_cmd_python, false, false},
+    {"plot-resistance", "draw the mean ice resistance of runs against the concentration, beside the estimates",
+     bt_cmd_python, false, false},
+    {"plot-chains", "draw the force chains of one step", bt_cmd_python, false, false},
+    {"plot-ensemble", "draw the pictures of an ensemble that its study supports", bt_cmd_python, false, false},
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
 
@@ -64,7 +78,7 @@ static void print_help(FILE *out)
 {
     fputs("Usage: bergtow COMMAND [OPTION...]\n"
           "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
-    for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-12s %s\n", commands[i].name, commands[i].summary);
+    for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-15s %s\n", commands[i].name, commands[i].summary);
     fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
           "  --list-quantities  the numbers that a run leaves: series, summary, estimates, with units and meaning; "
           "--json too\n"

@@ -31,10 +31,12 @@ static void tell_holder(int fd, const char *dir, bt_errors *err)
                   *who ? who : "it has not said who");
 }
 
-int bt_lock_take(const char *dir, bool *busy, bt_errors *err)
+int bt_lock_take(const char *dir, bool *busy, bt_errors *err) { return bt_lock_take_file(dir, "run.lock", busy, err); }
+
+int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *err)
 {
     if (busy) *busy = false;
-    char *path = bt_file_join(dir, "run.lock");
+    char *path = bt_file_join(dir, name);
     int fd = -1;
     for (bool taken = bt_file_may_take(path, err) != BT_OK; !taken;) {
         fd = bt_file_descriptor(path, O_RDWR | O_CREAT | O_NOFOLLOW);

@@ -10,7 +10,7 @@
 #include "case/case_check.h"
 
 /// Body widths that ice from this concentration on needs.
-static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.7, 30}, {0.85, 60}};
+static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.7, 30}, {0.85, BT_ARCH_LOCKING}};
 
 /// δ of arch.h, from this concentration on.
 static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, {0.95, 0.003}};

@@ -25,6 +25,7 @@
 #include "bergtow/case.h"
 
 #define BT_MADE_OFF 1e-9 ///< by which a concentration as made may be below the one asked for: rounding
+#define BT_ARCH_LOCKING 60 ///< body widths that ice asks for which locks as the body displaces it
 #define BT_BOUND_CONCENTRATION 0.75 ///< from which on rigid ice is said to have no upper bound of load, assumed
 
 /// Least cosine between a tow and an axis of the domain along which it is taken to go: the boundaries at the ends of

@@ -40,6 +40,62 @@ char *bt_case_resolved(const bt_case *c)
     return bt_case_text(c, BT_CASE_RESOLVED_HEAD);
 }
 
+/// The member of a key, of `size` bytes.
+static void member_of(const bt_case *c, const bt_key *k, void *out, size_t size)
+{
+    memcpy(out, (const char *)c + k->offset, size);
+}
+
+static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
+{
+    union {
+        double real;
+        int64_t integer;
+        bool yes;
+        unsigned choice;
+        const char *text;
+        const double *points;
+    } v;
+    switch (k->type) {
+    case BT_KEY_REAL: member_of(c, k, &v.real, sizeof v.real), bt_json_number(j, k->name, v.real); break;
+    case BT_KEY_INT: member_of(c, k, &v.integer, sizeof v.integer), bt_json_int(j, k->name, v.integer); break;
+    case BT_KEY_BOOL: member_of(c, k, &v.yes, sizeof v.yes), bt_json_bool(j, k->name, v.yes); break;
+    case BT_KEY_CHOICE:
+        member_of(c, k, &v.choice, sizeof v.choice);
+        bt_json_string(j, k->name, k->choices[v.choice]);
+        break;
+    case BT_KEY_TEXT: member_of(c, k, &v.text, sizeof v.text), bt_json_string(j, k->name, v.text); break;
+    case BT_KEY_MAP: break;
+    case BT_KEY_POINTS: {
+        int n;
+        member_of(c, k, &v.points, sizeof v.points);
+        memcpy(&n, (const char *)c + k->offset_count, sizeof n);
+        if (!n) {
+            bt_json_raw(j, k->name, "null");
+            break;
+        }
+        bt_json_open(j, k->name, '[');
+        for (int i = 0; i < n; i++) {
+            bt_json_open(j, NULL, '[');
+            bt_json_number(j, NULL, v.points[2 * i]);
+            bt_json_number(j, NULL, v.points[2 * i + 1]);
+            bt_json_close(j, ']');
+        }
+        bt_json_close(j, ']');
+    }
+    }
+}
+
+char *bt_case_resolved_json(const bt_case *c)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    const int n = bt_n_case_keys - bt_schema_added() + c->n_extra;
+    for (int k = 0; k < n; k++) json_value(&j, &bt_case_keys[k], c);
+    bt_json_close(&j, '}');
+    return j.text;
+}
+
 char *bt_case_text(const bt_case *c, const char *head)
 {
     bt_text text;

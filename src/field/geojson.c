@@ -38,7 +38,6 @@
 #include "field/map_place.h"
 #include "base/suggest.h"
 
-static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
 static const double DEGREE = BT_PI / 180;
 
 /// What the coordinates of a file are.
@@ -270,8 +269,8 @@ static const char *place(const reader *s, int n, double *v)
         double north, east, swapped_north, swapped_east;
         bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, s->lon0, s->lat0, &north, &east);
         bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, s->lon0, s->lat0, &swapped_north, &swapped_east);
-        if (!(bt_hypot(north, east) <= FARTHEST)) {
-            if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= FARTHEST)
+        if (!(bt_hypot(north, east) <= BT_MAP_FARTHEST)) {
+            if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= BT_MAP_FARTHEST)
                 return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
                        "[longitude, latitude]";
             return s->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
@@ -296,18 +295,19 @@ static void turn_round(int n, double *v)
         }
 }
 
+const char *const bt_map_near_thickness[] = {"thick", "height",   "h",   "ice_height", "draft",
+                                             "dicke", "tykkelse", "sit", NULL};
+
 /// Is a property likely to be a thickness under another name?
 static bool is_nearly_thickness(const char *name)
 {
-    static const char *const others[] = {"thick", "height",   "h",   "ice_height", "draft",
-                                         "dicke", "tykkelse", "sit", NULL};
     char lower[64];
     size_t n = 0;
     for (; name[n] && n < sizeof lower - 1; n++)
         lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
     lower[n] = 0;
-    for (int i = 0; others[i]; i++)
-        if (!strcmp(lower, others[i])) return true;
+    for (int i = 0; bt_map_near_thickness[i]; i++)
+        if (!strcmp(lower, bt_map_near_thickness[i])) return true;
     return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
 }
 

@@ -7,6 +7,11 @@
 #include "bergtow/field.h"
 #include "field/map_crs.h"
 
+/// Names of properties that come near to `thickness`, which is none of them; NULL ends them.
+extern const char *const bt_map_near_thickness[];
+
+#define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is one of small areas
+
 typedef struct bt_map_place {
     bt_map_kind kind;     ///< BT_MAP_DEGREES, BT_MAP_PLANE (of a projection), BT_MAP_LOCAL (of no place on the earth)
     double first, second; ///< longitude and latitude, rad; or east and north in the plane of the map, m

@@ -9,13 +9,21 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/checksum.h"
 #include "base/fileio.h"
+#include "base/json.h"
 #include "base/largest.h"
 #include "base/lock.h"
+#include "base/units.h"
+#include "case/arch.h"
+#include "case/case_base.h"
+#include "field/map_place.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
 #include "output/folder.h"
 #include "output/quantity_list.h"
+#include "output/steady.h"
+#include "run/ensemble_record.h"
 #include "run/run_parts.h"
 #include "space/cells.h"
 #include "step/edit.h"
@@ -458,12 +466,13 @@ int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room
 
 // --- cases and texts -------------------------------------------------------------------------------------------------
 
-bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved)
+bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved, char **values)
 {
     bt_errors err = {0};
     bt_case c;
     const bt_status status = read_case(&c, o, &err);
     *resolved = status == BT_OK ? bt_case_resolved(&c) : NULL;
+    *values = status == BT_OK ? bt_case_resolved_json(&c) : NULL;
     bt_case_free(&c);
     return reported(status, &err);
 }
@@ -477,8 +486,91 @@ char *bt_simulation_progress(const bt_simulation *s)
 
 char *bt_simulation_case(const bt_simulation *s) { return bt_case_resolved(&s->c); }
 
+const char *bt_file_holds(const char *path)
+{
+    static const char *const kinds[] = {
+        [BT_FILE_OTHER] = "", [BT_FILE_CASE] = "case", [BT_FILE_STUDY] = "study"};
+    return kinds[bt_case_kind_of(path)];
+}
+
+bt_status bt_number_read(const char *text, const char *unit, double *value)
+{
+    bt_errors err = {0};
+    char why[BT_WHY];
+    int kind = 0;
+    while (kind < BT_UNIT_KINDS && strcmp(bt_units_symbol(kind), unit) != 0) kind++;
+    if (kind == BT_UNIT_KINDS) bt_errors_add(&err, "%s: no SI unit of a key; see bergtow --list-keys", unit);
+    else if (!bt_units_parse(text, kind, value, why)) bt_errors_add(&err, "%s: %s", text, why);
+    return reported(err.n ? BT_ERR_USAGE : BT_OK, &err);
+}
+
+bt_status bt_seal_check(const char *path, const char *kind)
+{
+    static const char *const kinds[] = {BT_CHECKSUM_CHECKPOINT, BT_CHECKSUM_RESULT, BT_CHECKSUM_FIELD,
+                                        BT_CHECKSUM_ENSEMBLE};
+    const size_t n = strlen(kind);
+    bt_errors err = {0};
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+        if (!strncmp(kinds[k], kind, n) && kinds[k][n] == ' ')
+            return reported(bt_checksum_check(path, kinds[k], NULL, &err), &err);
+    bt_errors_add(&err, "%s: no kind of a sealed file; give result, ensemble, field or checkpoint", kind);
+    return reported(BT_ERR_USAGE, &err);
+}
+
+/// The records of one member.
+static bt_member_records one_record(uint64_t *seen, const void *made_by, size_t n)
+{
+    bt_member_records r = {.n = 1, .seen = seen};
+    bt_checksum_digest_text(made_by, n, r.study);
+    return r;
+}
+
+bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n)
+{
+    uint64_t seen = 0;
+    bt_errors err = {0};
+    bt_member_records r = one_record(&seen, made_by, n);
+    return reported(bt_member_record_write(&r, 0, name, folder, &err), &err);
+}
+
+bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n)
+{
+    uint64_t seen = 0;
+    bt_errors err = {0};
+    bt_member_records r = one_record(&seen, made_by, n);
+    return reported(bt_member_record_check(&r, 0, name, folder, &err), &err);
+}
+
+bt_status bt_folder_lock(const char *dir, int *lock)
+{
+    bt_errors err = {0};
+    *lock = bt_lock_take_file(dir, "lock", NULL, &err);
+    return reported(*lock >= 0 ? BT_OK : BT_ERR_IO, &err);
+}
+
+static char *limits_json(void)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    bt_json_open(&j, "verdicts", '[');
+    for (int k = 0; k <= BT_TOO_SHORT; k++) bt_json_string(&j, NULL, bt_verdict_names[k]);
+    bt_json_close(&j, ']');
+    bt_json_int(&j, "window_independent", BT_STEADY_INDEPENDENT);
+    bt_json_int(&j, "window_contact_stretches", BT_STEADY_STRETCHES);
+    bt_json_number(&j, "window_drift", BT_STEADY_MATERIAL);
+    bt_json_number(&j, "locking_body_widths", BT_ARCH_LOCKING);
+    bt_json_number(&j, "map_farthest_m", BT_MAP_FARTHEST);
+    bt_json_string(&j, "map_local_crs", BT_MAP_LOCAL_NAME);
+    bt_json_open(&j, "map_words_near_thickness", '[');
+    for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&j, NULL, bt_map_near_thickness[k]);
+    bt_json_close(&j, ']');
+    bt_json_close(&j, '}');
+    return j.text;
+}
+
 char *bt_list_json(const char *what)
 {
+    if (!strcmp(what, "limits")) return limits_json();
     const bool keys = !strcmp(what, "keys");
     if (!keys && strcmp(what, "quantities") != 0) return NULL;
     bt_text t;

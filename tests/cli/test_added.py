@@ -7,7 +7,6 @@ tow, a resumed one, the balance on the console, the pages.
 import json
 import re
 import subprocess
-import sys
 
 import h5py
 import numpy as np
@@ -17,8 +16,7 @@ import yaml
 from harness import CASE, ROOT, TOW, call, changed, write_case
 from test_contact_law import EXTENDED, of_run, started
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import bergtow_read  # noqa: E402
+from bergtow.result import run as bergtow_read
 
 CAPSULE = changed(TOW, run__duration=4, body__shape="capsule", body__length=3, body__width=1,
                   pilot={"depth": "0.04 km"})

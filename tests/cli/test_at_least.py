@@ -8,30 +8,30 @@ import argparse
 import csv
 import json
 import subprocess
-import sys
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from harness import ROOT, call, run, write_case
+from harness import BERGTOW, call, run, write_case
 from test_locked import jam
 
-sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "tests")]
-import at_least  # noqa: E402
-import budget  # noqa: E402
-import capability  # noqa: E402
-import command  # noqa: E402
-import ensemble  # noqa: E402
+from bergtow.result import at_least  # noqa: E402
+from bergtow.study import budget  # noqa: E402
+from bergtow.study import capability  # noqa: E402
+from bergtow import writing  # noqa: E402
+from bergtow.stats import conditions as ensemble
+from bergtow.text import ensemble as ensemble_text  # noqa: E402
 import made_up_ensemble as made_up  # noqa: E402
-import plot_resistance  # noqa: E402
-import report_run  # noqa: E402
-import text_table  # noqa: E402
-from at_least import AtLeast  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-from report_ensemble import OPTIONS  # noqa: E402
+from bergtow.plot import resistance as plot_resistance  # noqa: E402
+from bergtow.reporting import run as report_run  # noqa: E402
+from bergtow import table as text_table  # noqa: E402
+from bergtow.result.at_least import AtLeast  # noqa: E402
+from bergtow.errors import RunError  # noqa: E402
+from bergtow.result.run import Run  # noqa: E402
+from bergtow.result.members import Members  # noqa: E402
+from bergtow.reporting.ensemble import OPTIONS  # noqa: E402
 
 ENDED = "step 13: 2 steps have no solution, since bodies are locked, and guard.no_solution allows 1: let ice give way"
 
@@ -43,7 +43,7 @@ def test_such_a_number_says_so_wherever_it_is_formatted():
     assert text_table.quantity(x, "N") == "at least 12.3 kN" and text_table.number(x / 1e3) == "at least 12.3"
     assert f"{x:.3g}" == "at least 1.23e+04" and text_table.number(x * 1e5) == "at least 1.23e+09"
     assert (2 * x).share == (x / 2).share == 0.25 and float(x) == 12345.0
-    assert command.plain({"a": [x]}) == {"a": [12345.0]} and json.dumps(x) == "12345.0"
+    assert writing.plain({"a": [x]}) == {"a": [12345.0]} and json.dumps(x) == "12345.0"
 
 
 def test_a_mean_of_some_is_at_least_that():
@@ -127,16 +127,15 @@ def test_pages_of_a_run_say_at_least(locked, tmp_path):
     points = [plot_resistance.read(locked.dir)]
     assert "90 % ice adds at least " in plot_resistance.words(points) and share in plot_resistance.words(points)
     assert "| at least " in plot_resistance.table(points) and share in plot_resistance.table(points)
-    for script in ("plot_resistance.py", "plot_force.py", "plot_impacts.py", "report.py"):
-        where = tmp_path / ("x.html" if script == "report.py" else f"{script}.svg")
+    for script in ("plot-resistance", "plot-force", "plot-impacts", "report"):
+        where = tmp_path / ("x.html" if script == "report" else f"{script}.svg")
         drawn = script_of(script, locked.dir, "-o", where)
         assert drawn.returncode == 0, drawn.stderr
         assert "at least" in where.read_text(encoding="utf-8"), script
 
 
 def script_of(name, *arguments):
-    return subprocess.run([sys.executable, str(ROOT / "postproc" / name), *map(str, arguments)], capture_output=True,
-                          text=True)
+    return subprocess.run([BERGTOW, name, *map(str, arguments)], capture_output=True, text=True)
 
 
 def test_a_mean_of_runs_of_which_one_is_a_lower_bound_is_one():
@@ -149,7 +148,7 @@ def test_a_mean_of_runs_of_which_one_is_a_lower_bound_is_one():
 # ---- an ensemble
 
 def made(folder, some, sampling="grid"):
-    return Ensemble(made_up.write(folder, some, sampling=sampling))
+    return Members(made_up.write(folder, some, sampling=sampling))
 
 
 def statistics(e, **options):
@@ -174,7 +173,7 @@ def test_tows_that_ended_for_want_of_a_solution_bound_nothing(tmp_path):
     assert c["without_bound"]["ended"] == ["c001-r007"] and c["without_bound"]["some"] == []
     assert "1 of 7 tows ended for want of a solution" in c["without_bound"]["words"]
     assert isinstance(c["resistance"]["mean"], AtLeast) and np.isnan(c["resistance"]["t_95"]).all()
-    text = ensemble.ensemble_text.report(s)
+    text = ensemble_text.report(s)
     assert f"at least {text_table.number(float(c['resistance']['mean']))}" in text and "c001-r007" in text
     other = statistics(made(tmp_path / "b", [field(k) for k in range(6)] + [failed("step 3: the world ended")]))
     assert other["conditions"][0]["without_bound"]["words"] == ""
@@ -208,7 +207,7 @@ def test_a_study_in_which_ice_locks(tmp_path):
         "base": "case.yml", "repeats": 2, "parameters": {"ice.concentration": [0.5, 0.9],
                                                          "guard.no_solution": [0, 0.02]}}))
     call("ensemble", "study.yml", "-o", "out", "--threads", 1, cwd=tmp_path)
-    done = script_of("ensemble.py", tmp_path / "out", "--partial", "--time-scale", 0.2, "--tow-hours", 0.001,
+    done = script_of("statistics", tmp_path / "out", "--partial", "--time-scale", 0.2, "--tow-hours", 0.001,
                      "--resamples", 1)
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "out/statistics.json").read_text())["conditions"]
@@ -227,5 +226,5 @@ def test_a_study_in_which_ice_locks(tmp_path):
     assert "at least " in lines["guard no solution 0, concentration 90 %"]
     assert ["at least " in line for line in lines.values()].count(True) == 1 + sum(least[:2])
     assert f"{100 * some['without_bound']['share']:.2g} % of the steps of all that finished" in done.stdout
-    page = script_of("report.py", tmp_path / "out", "-o", tmp_path / "page.html")
+    page = script_of("report", tmp_path / "out", "-o", tmp_path / "page.html")
     assert page.returncode == 0 and "at least these in" in (tmp_path / "page.html").read_text(encoding="utf-8")

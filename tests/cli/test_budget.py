@@ -3,8 +3,6 @@
 and a study end to end."""
 import json
 import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,18 +12,17 @@ from scipy import stats
 import made_up_ensemble as made_up
 from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import analysis  # noqa: E402
-import budget  # noqa: E402
-import budget_text  # noqa: E402
-import compared  # noqa: E402
-import stat_budget  # noqa: E402
-import stat_load  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
-from command import plain  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-from test_loads import SERIES  # noqa: E402
+from bergtow import cli
+from bergtow.errors import RunError
+from bergtow.result import compared, findings
+from bergtow.result.members import Members
+from bergtow.result.run import Run
+from bergtow.stats import load as stat_load
+from bergtow.stats import variance as stat_budget
+from bergtow.study import analysis, budget
+from bergtow.text import budget as budget_text
+from bergtow.writing import plain
+from test_loads import SERIES
 
 
 def latin(n, k, rng):
@@ -82,7 +79,7 @@ def test_ishigami_through_the_ensemble(tmp_path):
     parameters, condition, y = drawn(model, 300, 3, 2, 0.5, rng)
     members = [made_up.member(np.full(3, v), {k: p[i] for k, p in parameters.items()}, int(condition[i]))
                for i, v in enumerate(y)]
-    found = budget.of_ensemble(Ensemble(made_up.write(tmp_path / "e", members, sampling="latin-hypercube")))
+    found = budget.of_ensemble(Members(made_up.write(tmp_path / "e", members, sampling="latin-hypercube")))
     v1, v2, v13 = 0.5 * (1 + b * pi ** 4 / 5) ** 2, a * a / 8, b * b * pi ** 8 * (1 / 18 - 1 / 50)
     total = v1 + v2 + v13
     assert found["parameters"]["sd"] == pytest.approx(np.sqrt(total), rel=0.08)
@@ -226,18 +223,18 @@ def with_status(folder, status, n=20, **more):
 
 def test_a_study_that_is_cut_short_is_taken_as_far_as_it_is_a_fair_sample(tmp_path):
     """Of each repeat the conditions before the first gap: those beyond are done because they take less time."""
-    e = Ensemble(with_status(tmp_path / "a", lambda c, r: r == 0 or c < 10 or c == 15))
+    e = Members(with_status(tmp_path / "a", lambda c, r: r == 0 or c < 10 or c == 15))
     found = budget.of_ensemble(e)
     assert (found["members"], found["conditions"], found["waiting"], found["left_out"]) == (30, 20, 9, 1)
     assert np.isfinite(found["mean_95"]).all()
     said = budget_text.text(plain(found | {"numerics": None}))
     assert said.startswith("WARNING: 9 of 40 members are still to come") and "beyond the first gap 1 are done" in said
     with pytest.raises(RunError, match="too few members for a budget: 0 conditions, needs 8"):
-        budget.of_ensemble(Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
+        budget.of_ensemble(Members(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
 
 
 def test_tows_with_doubts_are_counted(tmp_path):
-    found = budget.of_ensemble(Ensemble(with_status(tmp_path / "a", lambda c, r: made_up.FINISHED,
+    found = budget.of_ensemble(Members(with_status(tmp_path / "a", lambda c, r: made_up.FINISHED,
                                                     window={"n_contact_stretches": 2.0})))
     assert found["doubts"] == {"few": 2}
     said = budget_text.text(plain(found | {"numerics": None}))
@@ -251,7 +248,7 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(budget, "run_members", lambda *a: False)
     (tmp_path / "study.yml").write_text("")
     with pytest.raises(RunError, match=r"2 of 40 members failed \(c019-r001, c020-r002\)"):
-        budget.main([str(tmp_path / "study.yml"), "-o", str(folder)])
+        cli.perform("budget", tmp_path / "study.yml", "-o", folder)
     found, said = json.loads((folder / "budget.json").read_text()), capsys.readouterr().out
     assert found["mean_95"] == found["fields"]["sd_95"] == [None, None] and found["mean"] > 0
     assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
@@ -268,7 +265,7 @@ def loaded(folder, parted=None):
                 "impact_peak": 90 * rng.random(400)}
         members.append(made_up.member(x, {"ice.friction": (i // 2 + 0.5) / 10}, i // 2, more=more, attributes=SERIES,
                                       summary={"mean_tow_force_n": 3 * x.mean(), "events": event * (i == parted)}))
-    return Ensemble(made_up.write(folder, members, sampling="latin-hypercube"))
+    return Members(made_up.write(folder, members, sampling="latin-hypercube"))
 
 
 def test_numbers_are_those_of_the_loads_and_the_computation_that_of_the_ice_resistance(tmp_path):
@@ -298,7 +295,7 @@ def test_what_comes_after_a_line_parted_is_in_no_budget(tmp_path):
 def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp_path):
     """It is named all the same."""
     status = {(10, 0): made_up.WAITING, (15, 0): made_up.FAILED}
-    found = budget.of_ensemble(Ensemble(with_status(tmp_path / "a", lambda c, r: status.get((c, r), made_up.FINISHED))))
+    found = budget.of_ensemble(Members(with_status(tmp_path / "a", lambda c, r: status.get((c, r), made_up.FINISHED))))
     assert np.isfinite([*found["mean_95"], *found["fields"]["sd_95"]]).all()
     assert list(found["failed"]) == found["failed_beyond"] == ["c016-r001"]
     said = budget_text.text(plain(found | {"numerics": None}))
@@ -306,8 +303,8 @@ def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp
 
 
 def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
-    whole = Ensemble(with_status(tmp_path / "a", lambda c, r: 1))
-    cut = Ensemble(with_status(tmp_path / "b", lambda c, r: r == 0 or c < 10))
+    whole = Members(with_status(tmp_path / "a", lambda c, r: 1))
+    cut = Members(with_status(tmp_path / "b", lambda c, r: r == 0 or c < 10))
     found = plain(budget.of_all(cut, ["mean_ice_resistance_n"], None))
     assert compared.stale(found, cut) == "" == compared.stale({}, cut)
     assert compared.stale(found, whole) == "of 30 members, while 40 have finished"
@@ -339,7 +336,7 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("budget")
     write_case(folder, BASE, "base.yml")
     write_case(folder, STUDY, "study.yml")
-    done = script("budget.py", "study.yml", "-o", "out", "--budget", "3", cwd=folder)
+    done = script("budget", "study.yml", "-o", "out", "--budget", "3", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -394,13 +391,13 @@ def test_a_study_end_to_end(small):
     seconds = json.loads((member / "summary.json").read_text())["window"]
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
-    block = analysis.chapter("budget", analysis.read("budget", folder / "out"))
+    block = analysis.chapter("budget", findings.read("budget", folder / "out"))
     assert "\n\n| part |" in f"\n\n{block['markdown']}" and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
     def with_it(row, values):
         (folder / "converge.json").write_text(json.dumps({"rows": [row], "values": values}))
-        again = script("budget.py", "study.yml", "-o", "out", "--converge", "converge.json", cwd=folder)
+        again = script("budget", "study.yml", "-o", "out", "--converge", "converge.json", cwd=folder)
         assert again.returncode == 0, again.stderr
         return again.stdout, json.loads((folder / "out/budget.json").read_text())["numerics"]
     said, numerics = with_it(row, case)
@@ -417,7 +414,7 @@ def test_what_is_refused(small, tmp_path):
     def said(study, *more, out="refused", code=4):
         write_case(tmp_path, BASE, "base.yml")
         write_case(tmp_path, study, "study.yml")
-        done = script("budget.py", "study.yml", "-o", out, *more, cwd=tmp_path)
+        done = script("budget", "study.yml", "-o", out, *more, cwd=tmp_path)
         assert done.returncode == code and "Traceback" not in done.stderr
         return done.stderr
     def varied(**entry):
@@ -440,4 +437,4 @@ def test_what_is_refused(small, tmp_path):
         assert "another study" in said(study, *more, out=folder / "out", code=3)
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
-        budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))
+        budget.of_ensemble(Members(made_up.write(tmp_path / "g", [one])))

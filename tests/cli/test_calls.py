@@ -8,13 +8,11 @@ import sys
 import time
 
 import pytest
-from harness import BERGTOW, ROOT, TOW, call, changed, environment, heard, quick, write_case
+from harness import BERGTOW, TOW, call, changed, environment, heard, quick, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import case_runs  # noqa: E402
-from bergtow._calls import Calls  # noqa: E402
-from bergtow._interrupts import held  # noqa: E402
+from bergtow._calls import Calls
+from bergtow._interrupts import held
+from bergtow.study import runs as case_runs
 
 LONG = changed(TOW, run__dt=0.005, run__duration=60, output__window_start=15, domain__length=22, ice__concentration=0.5)
 STUDY = {"base": "case.yml", "repeats": 2, "sampling": "latin-hypercube", "samples": 2, "seed": 3,

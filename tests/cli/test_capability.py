@@ -2,23 +2,20 @@
 """postproc/capability.py: the search of a limit on trials of known chance, and the curve against brute-force runs."""
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import analysis  # noqa: E402
-import bracket  # noqa: E402
-import capability  # noqa: E402
-import capability_text  # noqa: E402
-import case_runs  # noqa: E402
-from bergtow_read import Run  # noqa: E402
+from bergtow.result import findings
+from bergtow.result.run import Run
+from bergtow.study import analysis, bracket, capability
+from bergtow.study import runs as case_runs
+from bergtow.text import capability as capability_text
 
 THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
                  ice__concentration=0.5, ice__size=0.6, ice__friction=0.2, body__length=1, tow__mode="thrust",
@@ -221,7 +218,7 @@ def test_a_stop_that_is_ordered_is_no_stop_in_the_ice(tmp_path):
 
 def found_in(folder, case, *more, code=0):
     write_case(folder, case)
-    done = script("capability.py", "case.yml", "-o", "out", *more, cwd=folder)
+    done = script("capability", "case.yml", "-o", "out", *more, cwd=folder)
     assert done.returncode == code, done.stderr
     if code:
         return done.stderr
@@ -398,7 +395,7 @@ class made_up_run(Told):
 
 
 def test_its_block_for_a_report(tmp_path):
-    assert analysis.read("capability", tmp_path) is None
+    assert findings.read("capability", tmp_path) is None
     point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 1, "speed": [0.4, 0.5], "mean_speed": 0.45,
              "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
              "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
@@ -411,35 +408,33 @@ def test_its_block_for_a_report(tmp_path):
              "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", analysis.read("capability", tmp_path))
+    block = analysis.chapter("capability", findings.read("capability", tmp_path))
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "| stood still | failed |" in block["markdown"] and "| 2 of 2 | – | 1 |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    said = analysis.chapter("capability", analysis.read("capability", tmp_path))["markdown"]
+    said = analysis.chapter("capability", findings.read("capability", tmp_path))["markdown"]
     assert "at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:
         row["estimate"] = None
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", analysis.read("capability", tmp_path))
+    block = analysis.chapter("capability", findings.read("capability", tmp_path))
     assert len(block["figure"]().axes) == 2  # no limit, no panel of it
     assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3
 
 
 def test_the_band_of_a_tow_that_is_driven_back_lies_about_its_curve():
-    import matplotlib.pyplot as plt
-    axes = plt.figure().add_subplot()
+    axes = Figure().add_subplot()
     c = {"label": "the case", "points": [
         {"value": v, "fields": 2, "speed": [mean - 0.1, mean + 0.1], "mean_speed": mean,
          "mean_speed_95": [mean - 0.3, mean + 0.3]} for v, mean in ((0.5, 0.2), (0.9, -0.4))]}
     capability_text._curve(axes, c, "speed", "k", 1.0, 1.0)
     band = axes.collections[0].get_paths()[0].vertices
-    plt.close("all")
     assert [band[band[:, 0] == v, 1].min() for v in (0.5, 0.9)] == pytest.approx([0.0, -0.5])
 
 

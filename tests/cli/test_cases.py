@@ -3,22 +3,20 @@
 it is from.
 """
 import re
-import sys
 
 import h5py
 import numpy as np
 import pytest
 import yaml
 
-from harness import BERGTOW, DONE, ROOT, call, run
+from harness import DONE, ROOT, call, run
 
-sys.path.insert(0, str(ROOT / "postproc"))
-from case_file import is_study  # noqa: E402
+from bergtow.study.case_file import is_study
 
 FIELD = ROOT / "cases/field"
 NAMES = ["barents-2004", "barents-2005", "bohai-2013", "kara-2017", "kulluk-1983"]
 FILES = sorted((ROOT / "cases").glob("**/*.yml"))
-CASES = [p for p in FILES if not is_study(BERGTOW, yaml.safe_load(p.read_text()))]
+CASES = [p for p in FILES if not is_study(p)]
 STUDIES = [p for p in FILES if p not in CASES]
 README = (FIELD / "README.md").read_text()
 

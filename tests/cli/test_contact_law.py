@@ -100,7 +100,7 @@ def test_same_bits_in_every_layout_and_after_a_stop(tmp_path, case, layouts):
 @pytest.mark.slow
 def test_the_page_of_the_run_names_its_keys(tmp_path):
     folder, *_ = of_run(tmp_path, changed(SPEED, run__duration=12))
-    done = script("report.py", folder)
+    done = script("report", folder)
     assert done.returncode == 0, done.stderr
     page = (folder / "report.html").read_text()
     assert "fender.load" in page

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""postproc/converge.py: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
+"""bergtow converge: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
 import json
 import re
 import shutil
 import subprocess
-import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,15 +12,15 @@ import numpy as np
 import pytest
 
 import made_up_ensemble as made_up
+from made_up_ensemble import record
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import case_runs  # noqa: E402
-import converge  # noqa: E402
-import converge_text  # noqa: E402
-import soundness  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
+from bergtow import cli
+from bergtow.errors import RunError
+from bergtow.result.run import Run
+from bergtow.study import converge
+from bergtow.study import runs as case_runs
+from bergtow.text import converge as converge_text
 
 
 @pytest.mark.parametrize("n", [4, 8, 32])
@@ -124,7 +123,7 @@ CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20
 
 def converged(folder, case, *more):
     write_case(folder, case)
-    result = script("converge.py", "case.yml", "-o", "out", *more, cwd=folder)
+    result = script("converge", "case.yml", "-o", "out", *more, cwd=folder)
     assert result.returncode == 0, result.stderr
     return json.loads((folder / "out/converge.json").read_text()), result.stdout
 
@@ -214,7 +213,7 @@ def test_runs_are_kept_and_a_spent_budget_is_reported(tmp_path):
 def test_what_is_refused(tmp_path):
     write_case(tmp_path, CASE)
     def said(*arguments):
-        return script("converge.py", *arguments, cwd=tmp_path)
+        return script("converge", *arguments, cwd=tmp_path)
     assert said("none.yml").returncode == 4 and "no such file" in said("none.yml").stderr
     assert said("case.yml", "--vary", "colour").returncode == 2 and said("case.yml", "--budget", "0").returncode == 2
     bad = said("case.yml", "--set", "ice.sise=1")
@@ -236,7 +235,7 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
            "judged": "matters", "recommended": 20.0, "same_ice": False}
     found = {"rows": [row], "looks": 5, "margin": 0.1, "spent_min": 2.0, "budget_min": 10}
     (folder / "converge.json").write_text(json.dumps(found))
-    text = script("ensemble.py", folder, "--resamples", 1).stdout
+    text = script("statistics", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
     assert "take 20 m, or wider" in text and converge_text.text(found) in text
 
@@ -275,7 +274,8 @@ def settled(runs, i, values=None, name="case", **summary):
     (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
     for file in ("result.h5", "case.resolved.yml"):
         (runs.path(name, i) / file).write_text(f"{file} of field {i}")
-    soundness.keep(runs.path(name, i), *runs.record(name, i, values or {}))
+    whose, made_by = runs.record(name, i, values or {})
+    record(runs.path(name, i), made_by.decode(), whose)
     (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(i, values or {})))
 
 
@@ -304,11 +304,12 @@ def another(path):
 
 
 @pytest.mark.parametrize("file, change, said", [
-    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json changed since"),
-    ("summary.json", cut, "summary.json changed since"), ("summary.json", another, "summary.json changed since"),
-    ("summary.json", Path.unlink, "summary.json is missing"), ("result.h5", another, "result.h5 changed since"),
-    ("finished", another, "is of another run"), ("finished", cut, "changed since"),
-    ("finished", Path.unlink, "missing")])
+    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json: has changed since"),
+    ("summary.json", cut, "summary.json: has changed since"),
+    ("summary.json", another, "summary.json: has changed since"),
+    ("summary.json", Path.unlink, "summary.json: "), ("result.h5", another, "result.h5: has changed since"),
+    ("finished", another, "is of another member"), ("finished", cut, "has changed since"),
+    ("finished", Path.unlink, "finished: ")])
 def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
     """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
     first = runs_of(tmp_path, CASE)
@@ -320,21 +321,22 @@ def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said
     for again in (runs, runs_of(tmp_path, CASE)):  # looked at before, and not
         assert not again.kept("case", 0, {}) and again.kept("case", 1, {})
         warning, = capsys.readouterr().err.splitlines()
-        assert warning.startswith("converge.py: warning: ") and "case/f001: " in warning and said in warning
+        assert warning.startswith("bergtow converge: warning: ") and "case/f001: " in warning and said in warning
         assert not again.kept("case", 0, {}) and not capsys.readouterr().err  # said once
 
 
 def test_a_changed_run_is_made_again(tmp_path):
     """Red at an effect of -0.016 in place of 0.00013, exit code 0; and at a traceback where the summary was cut."""
     write_case(tmp_path, changed(CASE, run__duration=5, output__window_start=2))
-    call = ["converge.py", "case.yml", "-o", "out", "--vary", "tolerance", "--jobs", "2"]
+    call = ["converge", "case.yml", "-o", "out", "--vary", "tolerance", "--jobs", "2"]
     assert script(*call, cwd=tmp_path).returncode == 0
     sound = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
     one, other = (tmp_path / f"out/converge/{name}/summary.json" for name in ("case/f001", "tolerance-1/f002"))
     one.write_text(re.sub(r'("mean_ice_resistance_n": )\S+', r"\g<1>1e6,", one.read_text()))
     cut(other)
     again = script(*call, "--force", cwd=tmp_path)
-    assert again.returncode == 0 and again.stderr.count("summary.json changed since it finished; the run is made") == 2
+    assert again.returncode == 0
+    assert again.stderr.count("summary.json: has changed since the member finished; the run is made") == 2
     assert json.loads((tmp_path / "out/converge.json").read_text())["rows"] == sound
 
 
@@ -374,9 +376,9 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
     with case_runs.locked(tmp_path / "out/converge") as lock:
         left = subprocess.Popen(["sleep", "60"], pass_fds=[lock])
     try:
-        second = script("converge.py", "case.yml", "-o", "out", cwd=tmp_path)
+        second = script("converge", "case.yml", "-o", "out", cwd=tmp_path)
         assert second.returncode == 4, second.stderr
-        assert re.search(r"out/converge: another call is at work in this folder \(process \d+ on ", second.stderr)
+        assert re.search(r"out/converge: another run is at work in this folder \(process \d+ on ", second.stderr)
         assert [p.name for p in tmp_path.glob("out/*/*")] == ["lock"] and not (tmp_path / "out/converge.json").exists()
     finally:
         left.kill()
@@ -394,8 +396,8 @@ def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
     short = changed(CASE, run__duration=5, output__window_start=2)
     path = write_case(tmp_path, short)
     with pytest.raises(RunError, match=r"dt-1/f001: this run failed, and 3 more: step 3: no sound state") as failed:
-        converge.main([str(path), "-o", str(tmp_path / "out"), "--vary", "dt", "--jobs", "1"])
-    assert failed.value.code == 5
+        cli.perform("converge", path, "-o", tmp_path / "out", "--vary", "dt", "--jobs", "1")
+    assert failed.value.status == 5
     row, = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
     assert row["judged"] == "open" and "no sound state" in row["why"]
 

@@ -52,7 +52,8 @@ def test_the_demo_answers_with_what_it_has_installed(tmp_path):
     out = tmp_path / "out"
     done = call("ensemble", tmp_path / "study.yml", "-o", out)
     assert done.returncode == DONE, done.stderr
-    scripts = [line.replace("out/demo", str(out)) for line in demo().splitlines() if " postproc/" in line]
+    scripts = [line.replace("out/demo", str(out)) for line in demo().splitlines()
+               if re.match("build/release/bergtow (?!ensemble)", line)]
     assert len(scripts) == 2
     for line in scripts:
         done = subprocess.run(line, shell=True, cwd=ROOT, capture_output=True, text=True,

@@ -3,32 +3,30 @@
 import re
 import shutil
 import subprocess
-import sys
 import zlib
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 import yaml
 
 import made_up_ensemble as made_up
 from browser import browser, complaints, opened
-from harness import BERGTOW, ROOT, TOW, call, changed, environment, script, write_case
+from harness import BERGTOW, TOW, call, changed, environment, script, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import design  # noqa: E402
-import domain_width  # noqa: E402
-import loads_text  # noqa: E402
-import pdf  # noqa: E402
-import report  # noqa: E402
-import report_case  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_run  # noqa: E402
-import style  # noqa: E402
-import text_table  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow import cli
+from bergtow import table as text_table
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.reporting import design, pdf
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import run as report_run
+from bergtow.result import origins as report_case
+from bergtow.result.members import Members
+from bergtow.result.run import Run
+from bergtow.study import domain_width
+from bergtow.text import loads as loads_text
 
 TITLE = 'Tiny "berg" <i>A</i> & 50 %'
 CASE = changed(TOW, run={"dt": 0.1, "duration": 40, "title": TITLE}, output__window_start=8, domain__length=14,
@@ -46,8 +44,8 @@ def made(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     patch.setenv("BERGTOW", str(BERGTOW))
-    design.main([str(folder / "case.yml"), "-o", str(folder / "out"), "--concentrations", "0.2,0.4", "--fields", "5",
-                 "--quiet", "--seed", "3"])
+    cli.perform("design", folder / "case.yml", "-o", folder / "out", "--concentrations", "0.2,0.4", "--fields", "5",
+                "--quiet", "--seed", "3")
     patch.undo()
     return folder / "out"
 
@@ -77,7 +75,7 @@ def test_the_study_that_it_makes(made):
     assert study["parameters"] == {"ice.concentration": [0.2, 0.4]} and study["repeats"] == 5 and study["seed"] == 3
     assert study["set"] == {"output.panels": True}
     assert study["base"] == "../case.yml" and study["title"] == f"{TITLE}: ice concentration 20 to 40 %"
-    e = Ensemble(made)
+    e = Members(made)
     assert e.complete and e.n == 10 and not list(made.glob("replay-*"))
     assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
 
@@ -109,11 +107,11 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
     write_case(tmp_path, case)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     out = tmp_path / "out"
-    design.main([str(tmp_path / "case.yml"), "-o", str(out), "--concentrations", "0.2,0.45", "--fields", "1", "--quiet",
-                 "--no-pdf", "--no-replay", *more])
+    cli.perform("design", tmp_path / "case.yml", "-o", out, "--concentrations", "0.2,0.45", "--fields", "1",
+                "--quiet", "--no-pdf", "--no-replay", *more)
     assert yaml.safe_load((out / "design.yml").read_text()).get("with") == wider
     narrow = 3 if "domain.width=6 m" in more else 2.5
-    widths = list(Ensemble(out).summary["domain_body_widths"])
+    widths = list(Members(out).summary["domain_body_widths"])
     assert widths == pytest.approx([narrow, 10 if wider else narrow], rel=0.01)
     assert ("at 45 % the domain is made 20.1 m wide" in capsys.readouterr().out) == bool(wider)
     page = (out / "report.html").read_text()
@@ -125,7 +123,7 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
 
 def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
     before = {p.name: p.stat().st_mtime_ns for p in made.iterdir()}
-    a = design.arguments([str(made.parent / "case.yml"), "-o", str(made)])
+    a = cli.arguments("design", str(made.parent / "case.yml"), "-o", made)
     design.make_replay(design.Work(BERGTOW, made, [], 2, np.inf, True), a, -3.0)
     assert "no replay" in (said := capsys.readouterr().out) and "and 0 s of the budget are left" in said
     assert {p.name: p.stat().st_mtime_ns for p in made.iterdir()} == before
@@ -202,7 +200,7 @@ def test_levels_have_the_digits_that_they_are_worth():
 
 def test_what_is_refused(made, tmp_path, monkeypatch):
     def said(*arguments, **more):
-        return script("design.py", *arguments, cwd=tmp_path, env=environment(**more))
+        return script("design", *arguments, cwd=tmp_path, env=environment(**more))
     write_case(tmp_path, CASE)
     assert said("none.yml").returncode == 4 and said("case.yml", "--concentrations", "0.99").returncode == 2
     other = said("case.yml", "--also", ".", "-o", "none")
@@ -217,7 +215,7 @@ def test_what_is_refused(made, tmp_path, monkeypatch):
     assert other.returncode == 3 and "another study" in other.stderr and (old / "report.html").read_bytes() == before
     monkeypatch.setattr(pdf, "NAMES", ("no-such-browser",))
     with pytest.raises(RunError, match="not installed.*apt-get install chromium"):
-        design.main([str(tmp_path / "case.yml"), "-o", str(tmp_path / "new")])
+        cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
@@ -226,8 +224,8 @@ def test_a_budget_that_does_not_reach(tmp_path, monkeypatch):
     write_case(tmp_path, long)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     with pytest.raises(RunError, match="do not reach for one field.*raise --budget"):
-        design.main([str(tmp_path / "case.yml"), "-o", str(tmp_path / "out"), "--budget", "0.05", "--concentrations",
-                     "0.5", "--quiet"])
+        cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--budget", "0.05", "--concentrations",
+                    "0.5", "--quiet")
 
 
 def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
@@ -246,13 +244,13 @@ def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
     (tmp_path / "out").mkdir()
     for name, value in (("seconds_a_field", 1.0), ("seconds_of_the_longest", 0.0), ("widths", {})):
         monkeypatch.setattr(design, name, lambda *a, value=value: value)
-    a = design.arguments([str(path), "-o", str(tmp_path / "out"), "--fields", "8", "--no-replay", "--concentrations",
-                          "0.2,0.4"])
+    a = cli.arguments("design", path, "-o", tmp_path / "out", "--fields", "8", "--no-replay", "--concentrations",
+                      "0.2,0.4")
     work = SimpleNamespace(ensemble=ensemble, jobs=2, end=np.inf, program=BERGTOW)
     work.end = design.time.monotonic() + 1000
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     assert asked == [2, 8] and design.fields_settled(tmp_path / "out") == 8
-    assert "c001-r002" in Ensemble(tmp_path / "out").holes()
+    assert "c001-r002" in Members(tmp_path / "out").holes()
     asked.clear()  # a later call begins with what is there
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     assert asked == [8] and design.fields_settled(tmp_path / "nowhere") == 0
@@ -264,7 +262,7 @@ def test_ice_that_is_read_gets_one_field(tmp_path, capsys):
     studies = []
     work = SimpleNamespace(program=None, jobs=1, end=np.inf,
                            ensemble=lambda study: studies.append(yaml.safe_load(study.read_text())) or True)
-    a = design.arguments([str(tmp_path / "case.yml"), "-o", str(tmp_path / "out")])
+    a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path / "out")
     design.run_case(work, a, {name: {} for name in design.SECTIONS} | {"ice": {"outlines": "floes.geojson"}})
     assert [s["repeats"] for s in studies] == [1] and "parameters" not in studies[0]
     assert "one field is run" in capsys.readouterr().out
@@ -428,7 +426,7 @@ def test_paths_are_cut(text, left):
 @pytest.mark.slow
 def test_the_report_of_a_run_as_pdf(made, tmp_path):
     path = tmp_path / "run.pdf"
-    report.main([str(made / "members/c001-r001"), "-o", str(path), "--revision", "Q"])
+    cli.perform("report", made / "members/c001-r001", "-o", path, "--revision", "Q")
     pages = pages_of(path)
     assert "Published and derived estimates" in "".join(pages) and "revision Q" in pages[0] and "Replay" not in pages[0]
 
@@ -445,8 +443,7 @@ def test_logarithmic_axes_are_labelled():
 
 
 def test_only_what_is_in_sight_is_in_the_legend():
-    import matplotlib.pyplot as plt
-    figure, axes = plt.subplots()
+    axes = Figure().subplots()
     x = np.linspace(0, 1, 11)
     axes.plot(x, x, label="through it")
     axes.plot(x, x + 20, label="above")
@@ -461,4 +458,3 @@ def test_only_what_is_in_sight_is_in_the_legend():
     handles, labels, lost = style.legend_of(axes)
     assert labels == ["through it", "across", "level", "in part"] and lost == ["above", "beside", "never joined"]
     assert handles[-1].get_linestyle() == ":"
-    plt.close(figure)

@@ -11,14 +11,14 @@ import shlex
 import pytest
 
 import harness
+from bergtow import cli
 from harness import DONE, ROOT, call
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
 PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
 HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
-COMMANDS = {"budget", "capability", "converge", "design", "run", "check", "field", "ensemble", "outlines", "resume",
-            "diff", "estimate"}
+COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate", *cli.COMMANDS}
 FOLLOWED = {"ice-from-an-image.md"}  # word for word, files and all, by test_import_map.py
 MADE_BY_RUNS = {"bench.csv", "statistics.csv"}
 # Words with a dot that begin like a section of a case and are none of its keys: files, and members of Python objects.
@@ -54,25 +54,24 @@ def spans(text):
 
 
 def calls(text, within_lines=True):
-    """Each call of the program: the line, and its words after the program."""
+    """Each call of the program: the line, and its words after the program; of a row of a table that begins with one
+    also the options that stand alone in it, one a call."""
     for line in commands(text) + (spans(text) if within_lines else []):
         if m := re.search(r"(?:^|\s)(?:build/\w+/)?bergtow\s+([a-z-].*)", line):
             yield line, shlex.split(re.sub(r"[|>].*", "", m[1]))
+    for row in re.findall(r"^\| `bergtow [a-z-]+ .*", text, re.M) if within_lines else []:
+        first, *rest = spans(row)
+        for option in (s for s in rest if s.startswith("--")):
+            yield first, [first.split()[1], *option.replace("\\", "").split()]
 
 
 def script_calls(path, within_lines=True):
-    """Each call of a script of Python on a page: the line, its path and its words; of a row of a table that begins with
-    one also the options that stand alone in it, one a call."""
+    """Each call of a script of Python on a page: the line, its path and its words."""
     text = path.read_text()
     for line in commands(text) + (spans(text) if within_lines else []):
-        line = re.sub(r"^\s*bergtow-report\b", "postproc/report.py", line)  # which is what it calls
         m = re.match(r"(?:/usr/bin/python3 )?([\w/]+\.py)(?: (.*))?$", line.strip())
         if m and (file := script(m[1], path.parent)):
             yield line, file, shlex.split(re.sub(r"[|>&].*", "", m[2] or ""))
-    for row in re.findall(r"^\| `\w+\.py .*", text, re.M) if within_lines else []:
-        first, *rest = spans(row)
-        for option in (s for s in rest if s.startswith("--")):
-            yield first, script(first.split()[0], path.parent), option.split()
 
 
 def code(text):
@@ -199,7 +198,9 @@ def test_functions_are_defined_where_the_page_says(path):
 
 @every_page
 def test_commands_and_options_are_known(path):
-    for line, words in calls(path.read_text()):
+    found = list(calls(path.read_text()))
+    assert len(found) > 40 or path.parent.name != "postproc"
+    for line, words in found:
         if words[0].startswith("--"):
             assert set(words) <= {"--help", "--version", "--list-keys", "--list-quantities", "--json"}, line
             continue
@@ -211,10 +212,8 @@ def test_commands_and_options_are_known(path):
 
 @every_page
 def test_scripts_and_their_options_are_known(path):
-    found = list(script_calls(path))
-    assert len(found) > 40 or path.parent.name != "postproc"
-    for line, file, words in found:
-        assert all((ROOT / w).exists() for w in words if w.startswith(("cases/", "postproc/"))), line
+    for line, file, words in script_calls(path):
+        assert all((ROOT / w).exists() for w in words if w.startswith("cases/")), line
         wanted = {w.split("=")[0] for w in words if re.match("-.", w)}
         if wanted:
             said = of_script(file, *itertools.takewhile(lambda w: w[0] != "-", words), "--help").stdout
@@ -246,9 +245,10 @@ def test_cases_are_valid_with_what_a_call_sets(path):
 
 
 def test_the_manual_has_every_command_and_option():
-    """But for those that every program has; and the commands of this test are those of the program."""
-    text = (ROOT / "docs/manual.md").read_text()
-    assert set(re.findall(r"^  ([a-z]+)  ", call("--help").stdout, re.M)) == COMMANDS
+    """Or postproc/README.md has it; but for those that every program has. And the commands of this test are the
+    program's."""
+    text = "".join((ROOT / page).read_text() for page in ("docs/manual.md", "postproc/README.md"))
+    assert set(re.findall(r"^  ([a-z][a-z-]*) +", call("--help").stdout, re.M)) == COMMANDS
     assert {words[0] for _, words in calls(text)} >= COMMANDS
     for command in sorted(COMMANDS):
         for option in options(command) - {"--usage", "--output"}:

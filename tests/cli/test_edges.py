@@ -190,11 +190,11 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
     path = write_case(tmp_path, changed(TOW, tow__mode="thrust", tow__line_length=2, tow__line_stiffness=5000,
                                         tow__vessel={"mass": 300, "bollard_pull": 10, "free_speed": 0.5}))
     def said(*words):
-        return script("capability.py", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
+        return script("capability", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
     for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
-                         (("--resolution", "1 m"), "--resolution 1 m: is no number"),
+                         (("--resolution", "1 m"), "--resolution 1 m: \"m\" after the number; give a plain number"),
                          (("--speed", "0 m/s"), "--speed 0 m/s: is not above 0"),
-                         (("--speed", "3 m"), "--speed 3 m: is no number of m/s")):
+                         (("--speed", "3 m"), "--speed 3 m: m is the unit of")):
         done = said(*words)
         assert done.returncode == 2 and wrong in done.stderr, done.stderr
     done = said("--search", "ice.size", "--from", "0.4 m", "--to", "0.8 m", "--resolution", "5 cm", "--speed", "0.1 kn")

@@ -11,7 +11,6 @@ import time
 import pytest
 from harness import BERGTOW, ROOT, TOW, call, changed, differing, environment, heard, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
 import bergtow  # noqa: E402
 
 import distributed  # noqa: E402
@@ -116,7 +115,7 @@ def test_what_is_wrong_is_said(client, tmp_path, monkeypatch):
     (tmp_path / "bad.yml").write_text(json.dumps({"base": "base.yml", "repeats": 1, "parameters": {"tow.sped": [1]}}))
     with pytest.raises(bergtow.BergtowError, match="tow.sped: unknown key"):
         bergtow.Ensemble.run(tmp_path / "bad.yml", tmp_path / "bad", client=client)
-    monkeypatch.setattr(bergtow.ensemble, "program_path", lambda: "/nowhere/bergtow")
+    monkeypatch.setattr(bergtow.study.ensemble, "program_path", lambda: "/nowhere/bergtow")
     with pytest.raises(bergtow.BergtowError, match="no worker of the Dask client could run /nowhere/bergtow"):
         bergtow.Ensemble.run(path, tmp_path / "out", client=client)
     client.retire_workers()

@@ -8,10 +8,8 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from html import unescape
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -22,10 +20,8 @@ from harness import (BERGTOW, CASE, DONE, IO, NUMERIC, RANK, SIGNAL, TOW, call, 
                      launcher, write_case)
 from resuming import children, started
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import report  # noqa: E402
-import report_ensemble  # noqa: E402
+from bergtow import cli
+from bergtow.reporting import ensemble as report_ensemble
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 CONDITIONS = {"base": "base.yml", "parameters": {"tow.speed": [0.1, 0.15, 0.2]}}
@@ -53,7 +49,7 @@ def page(monkeypatch):
     monkeypatch.setattr(report_ensemble, "pictures", lambda *_: {})
 
     def made(folder):
-        report.main([str(folder / "all")])
+        cli.perform("report", folder / "all")
         text = unescape((folder / "all/report.html").read_text())
         rows = {
             name: re.sub(r"<[^>]*>", " ", rest)

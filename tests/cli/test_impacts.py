@@ -3,7 +3,6 @@
 down again here."""
 import json
 import re
-import sys
 from types import SimpleNamespace
 
 import h5py
@@ -11,15 +10,14 @@ import numpy as np
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, script, write_case
+from harness import CASE, DONE, IO, TOW, call, changed, differing, run, script, write_case
 from resuming import assert_same_result, done, killed_after
 
-sys.path.insert(0, str(ROOT / "postproc"))
+from bergtow.plot import impacts as plot_impacts
+from bergtow.reporting import run as report_run
+from bergtow.result.run import Run as Folder
 
-import plot_impacts  # noqa: E402
-import report_run  # noqa: E402
-from bergtow_read import Run as Folder  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("look")
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
 LINE = changed(TOW,
                tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},
@@ -299,10 +297,10 @@ def test_the_picture_shows_what_the_file_holds(line, tmp_path):
         late = np.sort(hits["peak"][hits["time"] >= 10])[::-1]
         assert np.array_equal(curve.get_xdata(), late)
         np.testing.assert_allclose(curve.get_ydata(), np.arange(1, len(late) + 1) / line.summary["impacts"]["hours"])
-    done = script("plot_impacts.py", line.dir, "-o", tmp_path / "a.png")
+    done = script("plot-impacts", line.dir, "-o", tmp_path / "a.png")
     assert done.returncode == DONE and (tmp_path / "a.png").stat().st_size > 20000
     none = run(tmp_path, changed(TOW, run__duration=0.2, impact={"conversion": "none"}))
-    refused = script("plot_impacts.py", none.dir)
+    refused = script("plot-impacts", none.dir)
     assert refused.returncode == IO and "impact.conversion" in refused.stderr and "Traceback" not in refused.stderr
     quiet = run(tmp_path, changed(TOW, ice__concentration=0, run__duration=0.2), name="quiet")
-    assert script("plot_impacts.py", quiet.dir).returncode == DONE  # nothing met: still a picture
+    assert script("plot-impacts", quiet.dir).returncode == DONE  # nothing met: still a picture

@@ -6,7 +6,6 @@ by GDAL's own ogr2ogr; what comes out is read by the program's C reader, which h
 """
 import json
 import subprocess
-import sys
 
 import h5py
 import netCDF4
@@ -19,16 +18,14 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 import tutorial
-from harness import DONE, IO, ROOT, USAGE, call, changed, environment, run
+from harness import DONE, IO, USAGE, call, changed, environment, run
 from test_map import FRAMES
 from test_outlines import field, same_ring
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import map_read  # noqa: E402
-import map_stairs  # noqa: E402
-import outlines as command_line  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow import cli  # noqa: E402
+from bergtow.maps import read as map_read  # noqa: E402
+from bergtow.maps import stairs as map_stairs  # noqa: E402
+from bergtow.errors import BergtowError, RunError  # noqa: E402
 
 gdal.UseExceptions()
 GEOD = Geod(ellps="WGS84")
@@ -77,10 +74,10 @@ def outlines(map_, *words, code=DONE, name="out.geojson"):
     words = [str(w) for w in (map_, "-o", out, "--record", out.with_suffix(".json"), "--force", *words)]
     if code != DONE:
         with pytest.raises(RunError) as error:
-            command_line.main(words)
+            cli.perform("outlines", *words)
         assert not out.exists()
         return str(error.value)
-    command_line.main(words)
+    cli.perform("outlines", *words)
     root = json.loads(out.read_text())
     rings = [np.array(f["geometry"]["coordinates"][0][:-1]) for f in root["features"]]
     return rings, json.loads(out.with_suffix(".json").read_text())
@@ -424,7 +421,7 @@ def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles
             ring = inner[np.r_[True, np.abs(np.diff(inner, axis=0)).sum(axis=1) > 0]]
             ring = ring if np.abs(ring[0] - ring[-1]).sum() else ring[:-1]
         rings.append(np.round((ring + (70 * (k % 4), 70 * (k // 4))) * pixel, 5))
-    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    map_ = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     got, record = outlines(map_, "--heading", 90)
     assert counted(record)["stairs"] == 12 and record["floes"]["convex"] >= 11
     assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-4)
@@ -438,7 +435,7 @@ def test_outlines_traced_along_pixels_are_made_straight(tmp_path, pixel, middles
 def test_the_edge_of_an_image_is_seen_before_staircases_go(tmp_path):
     labels = discs(np.zeros((90, 90), np.int32), (20, 0, 12, 1), (60, 1, 15, 2), (40, 60, 20, 3))
     rings = [np.asarray(p.exterior.coords)[:-1] * (1, -1) for p, _ in map_read.regions(labels, labels > 0)]
-    map_ = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    map_ = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     counts = counted(outlines(map_)[1])
     assert counts["stairs"] == 3 and counts["cut kept"] == 2
 
@@ -449,7 +446,7 @@ def test_outlines_drawn_by_hand_are_no_staircases(tmp_path):
     crosses = [10 * cross + (200 * k, 30 * k) for k in range(3)] + [np.array([[0, 0], [10, 0], [10, 10], [0, 10]]) - 50]
     boxes = [np.array([[0, 0], [20, 0], [20, 30], [10, 30], [10, 20], [0, 20]]) + (50 * k, 10 * k) for k in range(6)]
     for rings in (boxes, crosses, RINGS):
-        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.LOCAL), "--centre", "0,0")
+        got, record = outlines(write(tmp_path / "map.geojson", rings, map_read.local_crs()), "--centre", "0,0")
         assert "stairs" not in counted(record)
         assert sum(map(plane_area, got)) == pytest.approx(sum(map(plane_area, rings)), rel=1e-9)
 
@@ -538,7 +535,7 @@ def test_a_map_that_is_turned_is_no_rectangle(tmp_path):
     rectangle is not full."""
     turned = np.array([[1, -1], [1, 1]]) / np.sqrt(2)
     rings = [(turned @ regular(x, y, 45, 4, np.pi / 4).T).T for x in range(-450, 500, 80) for y in range(-450, 500, 80)]
-    path = write(tmp_path / "map.geojson", rings, map_read.LOCAL)
+    path = write(tmp_path / "map.geojson", rings, map_read.local_crs())
     _, record = outlines(path)
     numbers = record["floes"]
     hull = (np.ptp(range(-450, 500, 80)) + 2 * 45 / np.sqrt(2)) ** 2
@@ -922,12 +919,12 @@ def test_bad_maps(tmp_path, name):
     (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
     (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
     (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])
-def test_usage(tmp_path, words, says, capsys, monkeypatch):
+def test_usage(tmp_path, words, says, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "map.geojson", [places(RINGS[0])])
-    with pytest.raises(SystemExit) as end:
-        command_line.main(["map.geojson", *([] if "-o" in words else ["-o", "out.geojson"]), *words, "--force"])
-    assert end.value.code == USAGE and says in capsys.readouterr().err
+    with pytest.raises(BergtowError) as end:
+        cli.perform("outlines", "map.geojson", *([] if "-o" in words else ["-o", "out.geojson"]), *words, "--force")
+    assert end.value.status == USAGE and says in str(end.value)
     assert [p.name for p in tmp_path.iterdir()] == ["map.geojson"]
 
 
@@ -949,7 +946,6 @@ def test_a_missing_library_is_named(tmp_path):
 @pytest.mark.slow
 def test_from_python(tmp_path):
     """The same file and numbers as the command's; what is not understood is its message."""
-    sys.path.insert(0, str(ROOT / "postproc"))
     import bergtow
     write(tmp_path / "map.geojson", [places(RINGS[0])])
     r = call("outlines", "map.geojson", "-o", "theirs.geojson", f"--centre={LON},{LAT}", "--record", "theirs.json",

@@ -1,46 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""No script of postproc/ replaces a file that none of them made, unless it is told to, or what is no regular file, and
-none loses a file where its reader leaves: every script, every kind of file."""
+"""No command of the Python package replaces a file that none of them made, unless it is told to, or what is no regular
+file, and none loses a file where its reader leaves: every command, every kind of file."""
 import os
 import re
 import shutil
 import stat
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, TOW, call, changed, script, write_case
+from harness import BERGTOW, ROOT, TOW, call, changed, script, write_case
 
-POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
-sys.path.insert(0, str(POSTPROC))
-
-import analysis  # noqa: E402
-import animate  # noqa: E402
-import budget  # noqa: E402
-import capability  # noqa: E402
-import command  # noqa: E402
-import converge  # noqa: E402
-import design  # noqa: E402
-import ensemble  # noqa: E402
-import outlines  # noqa: E402
-import plot_chains  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_field  # noqa: E402
-import plot_force  # noqa: E402
-import plot_impacts  # noqa: E402
-import plot_resistance  # noqa: E402
-import report  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_run  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow import cli, writing
+from bergtow.errors import RunError
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import run as report_run
+from bergtow.study import analysis, converge
 
 DEAR = b"dear to somebody"
-REFUSED = ": is there already, and was not made by these scripts; .*--force"
+REFUSED = ": is there already, and was not made by bergtow; .*--force"
 
 
 def long(*call):
@@ -48,29 +30,29 @@ def long(*call):
     return pytest.param(*call, marks=pytest.mark.slow)
 
 
-#: script: (module, arguments; RUN and ALL stand for the folders of a run and of an ensemble, and files it writes into
+#: (command, arguments; RUN and ALL stand for the folders of a run and of an ensemble, and files it writes into
 #: the working folder), in each line another kind of file
 CALLS = [
-    long(plot_force, ["RUN", "-o", "a.png", "--diagnostics"], ["a.png", "a-diagnostics.png"]),
-    (plot_field, ["RUN", "-o", "a.svg"], ["a.svg"]),
-    long(plot_impacts, ["RUN", "-o", "a.pdf"], ["a.pdf"]),
-    (animate, ["RUN", "-o", "a.mp4", "--frames", "2", "--width", "320"], ["a.mp4"]),
-    (animate, ["RUN", "-o", "a.gif", "--frames", "2", "--width", "320"], ["a.gif"]),
-    (plot_chains, ["RUN", "contacts.h5", "-o", "a.png"], ["a.png"]),
-    (plot_resistance, ["RUN", "-o", "a.png", "--table", "a.md"], ["a.png", "a.md"]),
-    long(plot_ensemble, ["ALL", "-o", "."], ["sweep-ice-concentration.png", "exceedance.png"]),
-    (ensemble, ["ALL", "-o", ".", "--resamples", "1"], ["statistics.json", "statistics.csv"]),
-    (report, ["RUN", "-o", "a.html"], ["a.html"]),
-    long(report, ["ALL", "-o", "a.pdf"], ["a.pdf"]),
-    (converge, ["case.yml", "-o", "."], ["converge.json"]),
-    (budget, ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
-    (capability, ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
-    (outlines, ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
+    long("plot-force", ["RUN", "-o", "a.png", "--diagnostics"], ["a.png", "a-diagnostics.png"]),
+    ("plot-field", ["RUN", "-o", "a.svg"], ["a.svg"]),
+    long("plot-impacts", ["RUN", "-o", "a.pdf"], ["a.pdf"]),
+    ("film", ["RUN", "-o", "a.mp4", "--frames", "2", "--width", "320"], ["a.mp4"]),
+    ("film", ["RUN", "-o", "a.gif", "--frames", "2", "--width", "320"], ["a.gif"]),
+    ("plot-chains", ["RUN", "contacts.h5", "-o", "a.png"], ["a.png"]),
+    ("plot-resistance", ["RUN", "-o", "a.png", "--table", "a.md"], ["a.png", "a.md"]),
+    long("plot-ensemble", ["ALL", "-o", "."], ["sweep-ice-concentration.png", "exceedance.png"]),
+    ("statistics", ["ALL", "-o", ".", "--resamples", "1"], ["statistics.json", "statistics.csv"]),
+    ("report", ["RUN", "-o", "a.html"], ["a.html"]),
+    long("report", ["ALL", "-o", "a.pdf"], ["a.pdf"]),
+    ("converge", ["case.yml", "-o", "."], ["converge.json"]),
+    ("budget", ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
+    ("capability", ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
+    ("outlines", ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
      ["a.geojson", "a.json", "a.png"]),
-    (design, ["case.yml", "-o", "."], ["design.yml", "report.html", "report.pdf", "replay.html"]),
+    ("design", ["case.yml", "-o", "."], ["design.yml", "report.html", "report.pdf", "replay.html"]),
 ]
 WRITE_NOTHING = {"contents"}
-SLOW = (budget, capability, design)  # refused before any work; that they replace their own their tests show
+SLOW = ("budget", "capability", "design")  # refused before any work; that they replace their own their tests show
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +76,7 @@ def quick(places, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(places / "case.yml", tmp_path)
     shutil.copy(places / "contacts.h5", tmp_path)
-    shutil.copy(POSTPROC.parent / "cases/outlines/made_up.geojson", tmp_path / "map.geojson")
+    shutil.copy(ROOT / "cases/outlines/made_up.geojson", tmp_path / "map.geojson")
     (tmp_path / "study.yml").write_text("base: case.yml\n")
     write_case(tmp_path, changed(TOW, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4,
                                  tow__line__breaking_load=1e5), "line.yml")
@@ -114,62 +96,61 @@ def work_of(file):
     return work
 
 
-def test_every_script_that_writes_is_here():
-    scripts = {p.stem for p in POSTPROC.glob("*.py") if "command.guarded(main)" in p.read_text()}
-    assert scripts == {getattr(c, "values", c)[0].__name__ for c in CALLS} | WRITE_NOTHING
+def test_every_command_that_writes_is_here():
+    assert set(cli.COMMANDS) == {getattr(c, "values", c)[0] for c in CALLS} | WRITE_NOTHING
 
 
-@pytest.mark.parametrize("module, words, files", CALLS, ids=lambda x: getattr(x, "__name__", None))
-def test_files_of_others_are_kept(quick, tmp_path, module, words, files, monkeypatch):
+@pytest.mark.parametrize("command, words, files", CALLS, ids=str)
+def test_files_of_others_are_kept(quick, tmp_path, command, words, files, monkeypatch):
     words = [quick.get(word, word) for word in words]
-    if module in SLOW:
+    if command in SLOW:
         for name in files:
             (tmp_path / name).write_bytes(DEAR)
             with pytest.raises(RunError, match=name + REFUSED):
-                module.main(words)
+                cli.perform(command, *words)
             assert (tmp_path / name).read_bytes() == DEAR
             (tmp_path / name).unlink()
         return
     for name in files:
         (tmp_path / name).write_bytes(DEAR)
         with pytest.raises(RunError, match=name + REFUSED):
-            module.main(words)
+            cli.perform(command, *words)
         assert (tmp_path / name).read_bytes() == DEAR
         assert not [other for other in files if other != name and (tmp_path / other).exists()]
         if name != files[-1]:
             (tmp_path / name).unlink()
     monkeypatch.setattr(converge, "converge", lambda *_: [])
-    module.main([*words, "--force"])
+    cli.perform(command, *words, "--force")
     made = {name: (tmp_path / name).read_bytes() for name in files}
     assert all(content != DEAR for content in made.values())
     stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
-    module.main(words)  # its own are replaced
+    cli.perform(command, *words)  # its own are replaced
     assert all((tmp_path / name).stat().st_mtime_ns > stamps[name] for name in files)
     assert not [p for p in tmp_path.iterdir() if ".new" in p.name]
 
 
-@pytest.mark.parametrize("module, words, files", CALLS, ids=lambda x: getattr(x, "__name__", None))
-def test_what_is_no_regular_file_is_kept(quick, tmp_path, module, words, files):
+@pytest.mark.parametrize("command, words, files", CALLS, ids=str)
+def test_what_is_no_regular_file_is_kept(quick, tmp_path, command, words, files):
     """Before any work, with --force or without; red where a pipe becomes a file."""
     words = [quick.get(word, word) for word in words]
     for name in files:
         os.mkfifo(tmp_path / name)
         for force in ([], ["--force"]):
             with pytest.raises(RunError, match=f"{name}: is there already, and is no file"):
-                module.main([*words, *force])
+                cli.perform(command, *words, *force)
         assert stat.S_ISFIFO((tmp_path / name).stat().st_mode)
         (tmp_path / name).unlink()
 
 
-@pytest.mark.parametrize("module, words, files",
-                         [c for c in CALLS if getattr(c, "values", c)[0] not in (*SLOW, converge)],
-                         ids=lambda x: getattr(x, "__name__", None))
-def test_a_reader_that_leaves(quick, tmp_path, module, words, files):
+@pytest.mark.parametrize("command, words, files",
+                         [c for c in CALLS if getattr(c, "values", c)[0] not in (*SLOW, "converge")],
+                         ids=str)
+def test_a_reader_that_leaves(quick, tmp_path, command, words, files):
     """`| head -1`: the text is lost, each file is there, and the code tells. Red where a script ends at the first line
     that nobody reads."""
     reader, writer = os.pipe()
     os.close(reader)
-    called = [sys.executable, POSTPROC / f"{module.__name__}.py", *(quick.get(word, word) for word in words)]
+    called = [BERGTOW, command, *(quick.get(word, word) for word in words)]
     done = subprocess.run(called, stdout=writer, stderr=subprocess.PIPE, text=True, timeout=300,
                           env=os.environ | {"PYTHONUNBUFFERED": "1"})
     os.close(writer)
@@ -179,36 +160,36 @@ def test_a_reader_that_leaves(quick, tmp_path, module, words, files):
 
 
 def test_pictures_carry_the_mark_where_it_can_be_read(tmp_path):
-    figure = report_run.plot_force.plt.figure()
+    figure = Figure()
     for name in ("a.png", "a.pdf", "a.svg"):
-        command.save(figure, tmp_path / name)
-    assert Image.open(tmp_path / "a.png").text["Software"] == command.MARK
-    assert re.search(rb"/Producer \(" + command.MARK.encode(), (tmp_path / "a.pdf").read_bytes())
-    assert command.MARK in (tmp_path / "a.svg").read_text().split("</metadata>")[0]
+        writing.save(figure, tmp_path / name)
+    assert Image.open(tmp_path / "a.png").text["Software"] == writing.MARK
+    assert re.search(rb"/Producer \(" + writing.MARK.encode(), (tmp_path / "a.pdf").read_bytes())
+    assert writing.MARK in (tmp_path / "a.svg").read_text().split("</metadata>")[0]
 
 
 def test_what_is_no_file(tmp_path):
     """A folder in its place, a place that cannot be; the exit code of the program. An empty file, as a crash leaves
     one, is nobody's loss."""
     with pytest.raises(RunError, match="is there already, and is no file"):
-        command.may_write(tmp_path, True)
+        writing.may_write(tmp_path, True)
     (tmp_path / "empty.md").write_bytes(b"")
-    command.write_markdown("x", tmp_path / "empty.md", False)
+    writing.write_markdown("x", tmp_path / "empty.md", False)
     assert (tmp_path / "empty.md").read_text().startswith("x")
     with pytest.raises(RunError, match="cannot be written"):
-        command.write_markdown("x", tmp_path / "empty.md" / "below.md", False)
+        writing.write_markdown("x", tmp_path / "empty.md" / "below.md", False)
     (tmp_path / "case.html").write_bytes(DEAR)
-    result = script("report.py", tmp_path, "-o", tmp_path / "case.html")
+    result = script("report", tmp_path, "-o", tmp_path / "case.html")
     assert result.returncode == 4 and "Traceback" not in result.stderr and "--force" in result.stderr
     assert (tmp_path / "case.html").read_bytes() == DEAR
 
 
 def test_a_page_that_fails_leaves_the_old_one(tmp_path):
     path = tmp_path / "a.md"
-    command.write_markdown("old", path, False)
+    writing.write_markdown("old", path, False)
     before = path.read_bytes()
     with pytest.raises(KeyboardInterrupt):
-        with command.written(path, False) as new:
+        with writing.written(path, False) as new:
             new.write_text("half")
             raise KeyboardInterrupt
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["a.md"]

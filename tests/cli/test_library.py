@@ -14,6 +14,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from bergtow import cli
 from harness import (
     BERGTOW,
     DONE,
@@ -282,33 +283,18 @@ def test_man_page_and_completions_know_every_option(prefix):
     subprocess.run(["bash", "-n", prefix / "share/bash-completion/completions/bergtow"], check=True)
 
 
-def test_bergtow_report_has_a_page_and_completions(prefix):
-    said = subprocess.run([prefix / "bin/bergtow-report", "--help"], capture_output=True, text=True, check=True).stdout
-    options = set(re.findall(r"(?m)^  (?:-\w(?: \S+)?, )?(--[a-z-]+)", said))
-    assert {"--help", "--output", "--client", "--also"} <= options
-    page = (prefix / "share/man/man1/bergtow-report.1").read_text().replace("\\-", "-")
-    zsh = (prefix / "share/zsh/site-functions/_bergtow-report").read_text()
-    bash = prefix / "share/bash-completion/completions/bergtow-report"
-    script = f"source {bash}; COMP_WORDS=(bergtow-report --); COMP_CWORD=1; _bergtow_report; echo ${{COMPREPLY[@]}}"
-    offered = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
-    assert set(offered) == options
-    for option in options:
-        assert f"\\fB{option}\\fR" in page and re.search(rf"'{option}[=\[]", zsh), option
-
-
-@pytest.mark.parametrize("script", ["converge", "budget", "capability", "design", "outlines", "report"])
-def test_a_debian_build_has_what_the_man_page_is_made_of(script):
-    """A script that lacks a module has no --help, and the page would be without its options."""
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_a_debian_build_has_what_the_man_page_is_made_of(command):
+    """A command that lacks a module has no --help, and the page would be without its options."""
     control = (ROOT / "install/debian/control").read_text()
     there = re.split(r",\s*", re.search(r"Build-Depends: (.*?)\n(?! )", control, re.DOTALL)[1])
     packages = {"numpy": "numpy", "scipy": "scipy", "h5py": "h5py", "yaml": "yaml", "matplotlib": "matplotlib",
                 "jinja2": "jinja2", "osgeo": "gdal", "pyproj": "pyproj", "shapely": "shapely", "pandas": "pandas",
                 "xarray": "xarray"}
     lacking = [module for module, name in packages.items() if f"python3-{name}" not in there]
-    code = (f"import runpy, sys\nsys.modules.update(dict.fromkeys({lacking}))\nsys.argv[:1] = []\n"
-            "runpy.run_path(sys.argv[0], run_name='__main__')")
-    done = subprocess.run([sys.executable, "-c", code, ROOT / f"postproc/{script}.py", "--help"], capture_output=True,
-                          text=True, env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")})
+    code = f"import sys\nsys.modules.update(dict.fromkeys({lacking}))\nfrom bergtow.cli import main\nmain()"
+    done = subprocess.run([sys.executable, "-c", code, command, "--help"], capture_output=True, text=True,
+                          env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")})
     assert done.returncode == 0 and "--help" in done.stdout, done.stderr
 
 
@@ -318,7 +304,7 @@ def test_completion_offers_commands_and_options(prefix):
                   f"COMP_CWORD={len(words) - 1}; _bergtow; echo ${{COMPREPLY[@]}}")
         return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
 
-    assert offered("bergtow", "re") == ["resume"]
+    assert offered("bergtow", "re") == ["resume", "report"]
     assert offered("bergtow", "run", "--st") == ["--steps"]
     assert offered("bergtow", "check", "--st") == []
 

@@ -4,11 +4,8 @@ import argparse
 import csv
 import json
 import shutil
-import sys
-from pathlib import Path
 
 import h5py
-import matplotlib
 import numpy as np
 import pytest
 from scipy import stats
@@ -17,23 +14,23 @@ import made_up_ensemble as made_up
 from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import loads as plot_loads
+from bergtow.reporting import statistics
+from bergtow.reporting import method as report_method
+from bergtow.reporting.ensemble import OPTIONS
+from bergtow.result.members import Members
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import alike as stat_alike
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement_module
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import load as stat_load
+from bergtow.text import ensemble as ensemble_text
+from bergtow.text import loads as loads_text
 
-import ensemble  # noqa: E402
-import ensemble_text  # noqa: E402
-import loads  # noqa: E402
-import loads_text  # noqa: E402
-import report_method  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_loads  # noqa: E402
-import stat_alike  # noqa: E402
-import stat_extreme  # noqa: E402
-import stat_load  # noqa: E402
-import statement as statement_module  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-from report_ensemble import OPTIONS  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("look")
 TRIALS = 14
 
 
@@ -233,7 +230,7 @@ def test_warnings_name_the_reason_of_the_verdict(tmp_path):
                            window={"verdict": "not steady" if why else "steady"}) for k, why in enumerate(reasons)]
     some += [made_up.member(np.ones(100), {"ice.concentration": 0.9}, 1, status=made_up.FAILED, reason="exit code 5")
              for _ in range(2)]
-    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
+    result = script("statistics", made_up.write(tmp_path / "all", some), "--resamples", 1, "--partial",
                     "--time-scale", 10)
     assert result.returncode == 0, result.stderr
     warned = [line.removeprefix("WARNING: ") for line in result.stdout.splitlines() if line.startswith("WARNING")]
@@ -262,14 +259,14 @@ def test_a_condition_whose_fields_differ_is_warned_of(tmp_path):
             x = 1e6 + 1e5 * np.exp(spread * rng.standard_normal()) * made_up.ar1(0.8, N, rng)
             some.append(made_up.member(x, {"ice.concentration": 0.5 + 0.1 * c}, c, more={"tow_force": x},
                                        attributes=SERIES, case=CASE.format(pressure=1, load=0)))
-    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1)
+    result = script("statistics", made_up.write(tmp_path / "all", some), "--resamples", 1)
     said = [line for line in result.stdout.splitlines() if "fields differ by more than chance" in line]
     assert len(said) == 1 and "concentration 60 % (8 fields, p < 0.0001)" in said[0] and "50 %" not in said[0]
     assert result.stdout.count("fields that are alike") >= 3  # table of the design, its warning, return levels
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     alike, unlike = (c["loads"]["tow_force"]["alike_p"] for c in s["conditions"])
     assert alike > 0.01 > unlike
-    cases = statement_module.cases(Ensemble(tmp_path / "all"), s)
+    cases = statement_module.cases(Members(tmp_path / "all"), s)
     assert "scatter of fields that are alike" in report_method.limits(cases)[-1]
     assert "fields that are alike" in " ".join(report_method.method(s, cases))
 
@@ -388,7 +385,7 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
 @pytest.fixture(scope="module")
 def statement(tmp_path_factory):
     folder = towed(tmp_path_factory.mktemp("towed") / "all")
-    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10)
+    result = script("statistics", folder, "--resamples", 5, "--hours", 1, 10)
     assert result.returncode == 0, result.stderr
     return folder, result.stdout, json.loads((folder / "statistics.json").read_text())
 
@@ -422,7 +419,7 @@ def test_the_branch_that_bears_more_is_designed_for(statement):
 def test_what_speaks_against_a_design_tension_is_named_as_of_the_tow_force(statement):
     """Red when the sample of the tow force alone is looked at, or a branch without a value is passed over."""
     folder, _, s = statement
-    e, c = Ensemble(folder), known(s["conditions"][1])
+    e, c = Members(folder), known(s["conditions"][1])
     said = lambda c: statement_module.statement(e, e.conditions()[1].finished, c)  # noqa: E731
     first, second = (c["loads"][name] for name in LOADED[2:])
     before, label = said(c), second["label"]
@@ -515,7 +512,7 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
     for ramp_s, jerk, words in ((20, 2e6, "while the ramp of 20 s accelerates the body; a longer ramp takes less: "
                                  "concentration 50 % (2.00 MN)."), (20, 1e6, None)):
         some = towed(tmp_path / f"{jerk:g}", fields=5, text=ramp.format(ramp_s), jerk=jerk)
-        said = script("ensemble.py", some, "--resamples", 1).stdout
+        said = script("statistics", some, "--resamples", 1).stdout
         assert words in said if words else "the start, which is left out" not in said
         assert "in the start" in said  # the column
 
@@ -528,7 +525,7 @@ def test_a_warning_of_many_conditions_names_the_first():
 @pytest.mark.slow
 def test_options_of_the_design_value(statement, tmp_path):
     folder, _, before = statement
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--tow-hours", 2, "--probability", 0.5)
+    result = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--tow-hours", 2, "--probability", 0.5)
     s = json.loads((tmp_path / "statistics.json").read_text())
     assert "exceeded with a probability of 50 % in a tow of 2 h, as the moving mean over 30 s" in result.stdout
     for a, b in zip(s["conditions"], before["conditions"]):
@@ -536,8 +533,8 @@ def test_options_of_the_design_value(statement, tmp_path):
         assert a["design"]["tow"]["value"] < b["design"]["tow"]["value"], "once in 2.9 h, not in 468 h"
         assert a["loads"]["tow_force"]["sd"] == b["loads"]["tow_force"]["sd"]
     for option in ("--time-scale", "--tow-hours", "--probability"):
-        assert script("ensemble.py", folder, option, "0").returncode == 2
-    step = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
+        assert script("statistics", folder, option, "0").returncode == 2
+    step = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
     assert "a step mean is no peak (1 s)" in step.stdout
 
 
@@ -548,11 +545,11 @@ def options(**changes):
 
 @pytest.mark.slow
 def test_model_scale_and_limits_of_line_and_ice(tmp_path):
-    e = Ensemble(towed(tmp_path / "a", pressure=1e6, load=2e6))
+    e = Members(towed(tmp_path / "a", pressure=1e6, load=2e6))
     e.summary["estimates_length_scale"] = np.full(e.n, 25.0)
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
-    found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
+    found = script("statistics", tmp_path / "a", "--resamples", 1).stdout
     assert "no upper bound" not in found
     above = "above the breaking load of the line"
     assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
@@ -563,10 +560,10 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
 def test_too_little_is_reported_and_not_guessed(tmp_path):
     short = [made_up.member(np.arange(60.0), {}, 0, more={"tow_force": np.arange(60.0)}, attributes=SERIES)
              for _ in range(2)]
-    result = script("ensemble.py", made_up.write(tmp_path / "s", short), "--resamples", 1)
+    result = script("statistics", made_up.write(tmp_path / "s", short), "--resamples", 1)
     assert result.returncode == 0 and "No design tow force" in result.stdout and "Traceback" not in result.stderr
     some = towed(tmp_path / "two", concentrations=(0.5,), fields=2)
-    result = script("ensemble.py", some, "--resamples", 1, "--time-scale", 150)
+    result = script("statistics", some, "--resamples", 1, "--time-scale", 150)
     s = json.loads((some / "statistics.json").read_text())
     warnings = [w["what"] for w in s["conditions"][0]["design"]["warnings"]]
     assert "no value" in warnings and "refused" in s["conditions"][0]["design"]["tow"]
@@ -576,7 +573,7 @@ def test_too_little_is_reported_and_not_guessed(tmp_path):
 def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):
     folder = towed(tmp_path / "a", concentrations=(0.5,))
     (folder / "members/c001-r001").rename(folder / "elsewhere")
-    e = Ensemble(folder)
+    e = Members(folder)
     found = loads.statistics(e, e.conditions()[0].finished, options())
     assert found["tow_force"]["fields"] == 6 and found["line_tension_1"]["fields"] == 5
 
@@ -601,7 +598,7 @@ def sparse(folder, fields=10, meet=4, n=SPARSE, changes=None):
 
 def of_all(folder, **changes):
     """statistics.json of a folder as a dict, and its tables."""
-    s = ensemble.statistics(Ensemble(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
+    s = ensemble.statistics(Members(folder), argparse.Namespace(**OPTIONS | {"resamples": 1} | changes))
     return s, ensemble_text.report(s, False)
 
 
@@ -643,12 +640,11 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
     thrust = s["conditions"][0]["loads"]["vessel_thrust"]
     assert "saturated at 1e+06 N" in thrust["over_threshold"]["refused"] and "value" not in thrust["design"]
     assert "saturated at 1e+06 N" in text and thrust["largest"] == pytest.approx(1e6)
-    ensemble.write(s, tmp_path, False)
-    e = Ensemble(tmp_path / "a")
+    statistics.write(s, tmp_path, False)
+    e = Members(tmp_path / "a")
     for name in ("tow_force", "vessel_thrust"):
         plot_ensemble.draw_above(e, s["conditions"], name)
         plot_ensemble.draw_returns(e, s["conditions"], name)
-    matplotlib.pyplot.close("all")
 
 
 def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
@@ -723,9 +719,9 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     none; the start is that of all tows, of those too whose line parts in it."""
     folder = parting(tmp_path / "a", {0: [(900, 1)], 4: [(200, 1)]}, jerk={4: 4e6})
     s, text = of_all(folder)
-    e, (c,) = Ensemble(folder), s["conditions"]
+    e, (c,) = Members(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
-    told = script("ensemble.py", folder, "--resamples", 1, "--force").stderr
+    told = script("statistics", folder, "--resamples", 1, "--force").stderr
     assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
     towed = e.series(0)[1][300:900].mean()
     assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
@@ -784,9 +780,9 @@ def test_members_without_their_folders_parted_all_the_same(tmp_path):
     """Red when events were in their folders alone: tows adrift had means of the whole window, and no word of it."""
     folder = parting(tmp_path / "a", {0: [(900, 1)], 3: [(310, 1)], 4: [(200, 1)]}, fields=6)
     there, _ = of_all(folder)
-    means = Ensemble(folder).mean
+    means = Members(folder).mean
     shutil.rmtree(folder / "members")
-    e, (gone, _) = Ensemble(folder), of_all(folder)
+    e, (gone, _) = Members(folder), of_all(folder)
     assert np.array_equal(e.mean, means, equal_nan=True) and np.isnan(means[[3, 4]]).all()
     assert [e.adrift(m) for m in range(6)] == [900, np.inf, np.inf, 310, 200, np.inf]
     for s in (there, gone):
@@ -796,7 +792,7 @@ def test_members_without_their_folders_parted_all_the_same(tmp_path):
 
 def test_the_picture_of_return_levels(statement):
     folder, _, s = statement
-    e = Ensemble(folder)
+    e = Members(folder)
     assert [n for n, _ in plot_ensemble.pictures(e, None, s["conditions"])][:2] == ["returns-tow-force",
                                                                                     "returns-ice-resistance"]
     for c in s["conditions"]:  # as JSON has it
@@ -814,4 +810,3 @@ def test_the_picture_of_return_levels(statement):
     figure = plot_ensemble.draw_returns(e, s["conditions"], "tow_force")
     assert "no design value" in str([t.get_text() for t in figure.texts])
     assert not [line for line in figure.axes[0].lines if line.get_marker() == "D"]
-    matplotlib.pyplot.close("all")

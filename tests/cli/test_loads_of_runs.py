@@ -3,24 +3,21 @@
 loads, against the series of the members by plain NumPy."""
 import argparse
 import json
-import sys
 
 import h5py
 import numpy as np
 import pytest
 from scipy import stats
 
-from harness import ROOT, TOW, call, changed, write_case
+from harness import TOW, call, changed, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
-
-import ensemble  # noqa: E402
-import loads_text  # noqa: E402
-import plot_ensemble  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_method  # noqa: E402
-import statement  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import method as report_method
+from bergtow.result.members import Members
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement
+from bergtow.text import loads as loads_text
 
 N = 4
 VESSEL = changed(TOW, run={"dt": 0.05, "duration": 40}, domain={"length": 30, "width": 10},
@@ -40,7 +37,7 @@ def towed(tmp_path_factory):
     (folder / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": N}))
     done = call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=folder)
     assert done.returncode == 0, done.stderr
-    e = Ensemble(folder / "out")
+    e = Members(folder / "out")
     options = report_ensemble.OPTIONS | {"resamples": 1, "hours": [0.005, 0.02]}
     return e, ensemble.statistics(e, argparse.Namespace(**options))
 
@@ -104,7 +101,7 @@ def test_a_bridle_that_loses_a_branch_before_the_window(tmp_path):
     write_case(tmp_path, case, "base.yml")
     (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": N}))
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     for m in range(N):
         broken, = e.events(m)
         assert broken["kind"] == "line_broken" and broken["subject"] == 2 and broken["value"] > 120
@@ -128,7 +125,7 @@ def test_samples_of_several_steps(tmp_path):
     write_case(tmp_path, changed(VESSEL, output__sample_every=7, output__panels=False), "base.yml")
     (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": 2}))
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     c, = ensemble.statistics(e, argparse.Namespace(**report_ensemble.OPTIONS | {"resamples": 1}))["conditions"]
     assert "of every 7 steps the largest alone was kept" in c["loads_left_out"]["floe_force"]["why"]
     assert "floe_force" not in c["loads"] and "tow_force" in c["loads"]

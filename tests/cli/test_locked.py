@@ -5,7 +5,6 @@ Each scene has so little work that its steps do not converge; the answer is know
 bodies that have a way out are called locked, a lock is not found (also across ranks), what rafts counts as hard, the
 summary advises more sweeps against a lock, or prints its loads as numbers.
 """
-import sys
 from types import SimpleNamespace
 
 import h5py
@@ -14,13 +13,12 @@ import pytest
 import scipy.optimize
 import scipy.sparse
 
-from harness import NUMERIC, ROOT, Run, area, changed, differing, quick, run, warned, write_case
+from harness import NUMERIC, Run, area, changed, differing, quick, run, warned, write_case
 from resuming import done
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import bergtow_read  # noqa: E402
-import loads  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow.result import run as bergtow_read
+from bergtow.result.members import Members
+from bergtow.stats import loads
 
 A = 1.0
 TOWED = {
@@ -336,7 +334,7 @@ def test_a_tow_without_a_load_has_no_tail():
     share, none = [0.0, 0.2, np.nan], np.zeros(3, int)
     e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [], condition=none,
                         status=none, name=list("abc"))
-    e.without_bound = lambda rows: Ensemble.without_bound(e, rows)
+    e.without_bound = lambda rows: Members.without_bound(e, rows)
     load = SimpleNamespace(name="ice_resistance", needs="")
     assert "no bound in some steps of 1 of 3 tows" in loads.cut_off(e, [0, 1, 2], load)
     assert loads.cut_off(e, [0, 2], load) == ""

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import matplotlib
 import numpy as np
 import pytest
 from scipy import stats
@@ -11,11 +10,12 @@ from scipy import stats
 from harness import DONE, call, changed, script, write_case
 from test_postproc import done, make_run, pixels, where
 
-import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
-import stat_drift  # noqa: E402
-import style  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.plot import resistance as plot_resistance
+from bergtow.stats import drift as stat_drift
 
+pytestmark = pytest.mark.usefixtures("look")
 BERG = {
     "run": {"dt": 5, "duration": 1000},
     "domain": {"frame": "geographic", "length": 5000, "width": 2000, "ends": "wall", "sides": "wall"},
@@ -83,7 +83,7 @@ def test_the_picture_has_points_bars_and_curves(runs):
 
 
 def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
-    done(script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--table", tmp_path / "new/r.md"),
+    done(script("plot-resistance", *runs, "-o", tmp_path / "r.png", "--table", tmp_path / "new/r.md"),
          tmp_path / "r.png", tmp_path / "new/r.md")
     head, _, *lines = (tmp_path / "new/r.md").read_text().split("\n\n<!--")[0].splitlines()
     cells = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
@@ -114,7 +114,7 @@ def test_the_factor_of_an_interval_is_students():
 
 def test_the_words_have_means_intervals_verdicts_and_estimates(runs, tmp_path):
     """Red: the interval of several tows by 1.96; an estimate outside its range; of a tow alone that of all."""
-    result = script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--words")
+    result = script("plot-resistance", *runs, "-o", tmp_path / "r.png", "--words")
     path, empty, *said = result.stdout.splitlines()
     assert result.returncode == 0 and path == str(tmp_path / "r.png") and not empty
     assert said[0] == "10 % ice adds 2.00 kN (95 %: 0.0400 to 3.96), the mean of 1 tow."
@@ -151,7 +151,7 @@ def test_tows_of_other_length_are_no_other_case(runs):
 
 
 def test_the_default_place_is_beside_the_first_run(runs, tmp_path):
-    done(script("plot_resistance.py", *runs), tmp_path / "resistance.png")
+    done(script("plot-resistance", *runs), tmp_path / "resistance.png")
 
 
 def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
@@ -162,12 +162,11 @@ def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
     figure = plot_resistance.draw(points)
     assert any("1 run(s) without resistance" in text.get_text() for text in figure.texts)
     assert "–" in plot_resistance.table(points).splitlines()[2]
-    matplotlib.pyplot.close(figure)
 
 
 def test_runs_of_other_conditions_are_refused(runs, tmp_path):
     thick = made_up(tmp_path / "thick", 0.7, 1e5, case=changed(BERG, ice__thickness=1.2))
-    result = script("plot_resistance.py", *runs, thick, "-o", tmp_path / "r.png")
+    result = script("plot-resistance", *runs, thick, "-o", tmp_path / "r.png")
     assert result.returncode == 4 and "thick: has other conditions" in result.stderr and ";" in result.stderr
     assert not (tmp_path / "r.png").exists()
 
@@ -195,17 +194,17 @@ def test_runs_without_the_numbers_are_refused(tmp_path, spoil, words):
     summary = json.loads((run / "summary.json").read_text())
     spoil(summary)
     (run / "summary.json").write_text(json.dumps(summary))
-    result = script("plot_resistance.py", run)
+    result = script("plot-resistance", run)
     assert result.returncode == 4 and words in result.stderr and "Traceback" not in result.stderr
 
 
 def test_usage(tmp_path):
-    assert script("plot_resistance.py").returncode == 2
-    result = script("plot_resistance.py", tmp_path, "-o", "r.txt")
+    assert script("plot-resistance").returncode == 2
+    result = script("plot-resistance", tmp_path, "-o", "r.txt")
     assert result.returncode == 2 and "unknown kind of file" in result.stderr
 
 
 def test_contents_lists_the_estimates_without_their_curves(runs):
-    result = script("contents.py", runs[0])
+    result = script("contents", runs[0])
     assert result.returncode == 0
     assert "estimates.lichey_hellmer.force_n" in result.stdout and "curves" not in result.stdout

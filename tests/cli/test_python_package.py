@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The Python package on libbergtow: cases, results and ensembles as datasets, its page, its installation."""
+import ctypes
 import copy
 import inspect
 import json
@@ -17,6 +18,7 @@ import h5py
 import numpy as np
 import pytest
 from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
+from bergtow import cli
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -324,17 +326,62 @@ def test_a_missing_module_is_a_message(tmp_path):
         assert f"{name} is missing" in said and f"python3-{name}" in said
 
 
-SCRIPTS = sorted(p.name for p in (ROOT / "postproc").glob("*.py") if "__main__" in p.read_text())
-
-
-@pytest.mark.parametrize("script", SCRIPTS)
-def test_a_python_without_packages_is_a_message(script):
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_a_python_without_packages_is_a_message(command):
     """-S: no site-packages, as in a Python of another origin."""
-    assert len(SCRIPTS) >= 15
-    said = subprocess.run([sys.executable, "-S", ROOT / "postproc" / script, "x"], capture_output=True, text=True)
-    assert said.returncode == IO and said.stderr.startswith((f"{script}: ", f"bergtow {script[:-3]}: "))
-    assert said.stderr.count("\n") == 1
-    assert re.search(rf"\w+ is missing in {sys.executable} .*; install python3-\w+ \(Debian\)", said.stderr)
+    said = subprocess.run([sys.executable, "-S", "-m", "bergtow", command, "x"], capture_output=True, text=True,
+                          env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")})
+    assert said.returncode == IO and said.stderr.startswith("bergtow: bergtow needs numpy, which ")
+    assert said.stderr.count("\n") == 1 and "python3-numpy (Debian)" in said.stderr
+
+
+def test_what_the_library_says_of_units_files_and_limits(tmp_path):
+    """Red: the unit of a bare angle is lost; a study with a base is a case; a limit is another than the program's."""
+    lib, value = bergtow._library.library(), ctypes.c_double()
+    for text, unit, wanted in (("1.5 kn", "m/s", 1.5 * 1852 / 3600), ("180", "rad", np.pi), ("2", "", 2.0)):
+        lib.bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+        assert value.value == pytest.approx(wanted, rel=1e-15)
+    for text, unit in ("1 m", "m/s"), ("x", ""), ("1", "furlong"):
+        with pytest.raises(bergtow.BergtowError):
+            lib.bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+    for text, kind in ("base: a.yml\nrepeats: 2\n", b"study"), ("run: {dt: 1}\n", b"case"), ("[1]\n", b""):
+        (tmp_path / "file.yml").write_text(text)
+        assert lib.bt_file_holds(os.fsencode(tmp_path / "file.yml")) == kind
+    header = (ROOT / "src/output/steady.h").read_text()
+    limits = bergtow._library.listed("limits")
+    for name, macro in (("window_independent", "INDEPENDENT"), ("window_contact_stretches", "STRETCHES"),
+                        ("window_drift", "MATERIAL")):
+        assert limits[name] == float(re.search(rf"#define BT_STEADY_{macro} (\S+)", header)[1])
+
+
+def test_modules_use_those_below_them():
+    """In the order of the table in docs/architecture.md. Red: result/ imports plot/; the table lacks a module."""
+    table = re.search(r"^## The Python package\n(.*?)^## ", (ROOT / "docs/architecture.md").read_text(), re.S | re.M)[1]
+    rows = re.findall(r"^\| ([\\\w, ]+) \| \S+ ", table, re.M)[1:]
+    rows = [re.findall(r"\w+", row.replace("\\", "")) for row in rows]
+    place = {name: -k for k, row in enumerate(rows) for name in row}
+    package = ROOT / "postproc/bergtow"
+    for file in sorted(package.rglob("*.py")):
+        own = file.relative_to(package).parts[0].removesuffix(".py")
+        if own in ("__init__", "__main__"):
+            continue
+        for module, names in re.findall(r"^from (?:bergtow)?\.?([\w.]*) import ([\w, ]+)", file.read_text(), re.M):
+            for used in [module.split(".")[0]] if module else [name.split()[0] for name in names.split(", ")]:
+                assert used not in place or place[used] <= place[own], (file, used)
+        assert own in place, file
+
+
+def test_the_program_and_the_package_have_the_same_commands():
+    """Each command of the package in `bergtow --help`, in its words; the program's others reach it from Python."""
+    listed = dict(re.findall(r"^  ([a-z-]+) +(\S.*)$", call("--help").stdout, re.M))
+    assert {name: listed.get(name) for name in cli.COMMANDS} == {name: about for name, (_, about) in
+                                                                 cli.COMMANDS.items()}
+    others = [name for name in listed if name not in cli.COMMANDS]
+    assert len(others) >= 7
+    for name in others:
+        said = subprocess.run([sys.executable, "-m", "bergtow", name, "--help"], capture_output=True, text=True,
+                              env=os.environ | {"PYTHONPATH": str(ROOT / "postproc"), "BERGTOW": str(BERGTOW)})
+        assert said.stdout == call(name, "--help").stdout
 
 
 def test_the_package_in_a_python_without_numpy():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
+"""Pictures, statistics and reports as functions of the Python package, and their commands."""
+import hashlib
 import json
 import os
 import re
@@ -47,9 +48,9 @@ def drawn_by(name, *arguments):
     pytest.param("impacts", [], {}, marks=pytest.mark.slow),
     pytest.param("resistance", ["--linear"], {"linear": True}, marks=pytest.mark.slow),
 ])
-def test_a_picture_is_that_of_the_script(towed, tmp_path, name, words, options):
+def test_a_picture_is_that_of_the_command(towed, tmp_path, name, words, options):
     picture = getattr(bergtow, f"plot_{name}")(bergtow.Result(towed), **options)
-    drawn_by(f"plot_{name}.py", towed, "-o", tmp_path / "theirs.png", *words)
+    drawn_by(f"plot-{name}", towed, "-o", tmp_path / "theirs.png", *words)
     assert picture._repr_png_() == (tmp_path / "theirs.png").read_bytes()
     assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
 
@@ -78,12 +79,17 @@ def test_what_cannot_be_drawn_is_said(towed, tmp_path):
 
 
 def test_the_callers_matplotlib_is_left_alone(towed):
-    """Neither its backend nor a module of the caller with the name of a script is touched."""
-    script = (f"import sys, types; sys.path.insert(0, {str(ROOT / 'postproc')!r}); sys.modules['style'] = None\n"
-              f"import bergtow; bergtow.plot_force({str(towed)!r})\n"
-              "print('matplotlib' in sys.modules, sys.modules['style'])")
+    """Neither its backend and settings nor a module of the caller with the name of one of ours is touched, and what it
+    has set is not in the picture."""
+    plain = bergtow.plot_force(towed)._repr_png_()
+    script = (f"import sys; sys.path.insert(0, {str(ROOT / 'postproc')!r}); sys.modules['style'] = None\n"
+              "import bergtow, hashlib, matplotlib\nmatplotlib.use('svg'); matplotlib.rcParams['font.size'] = 20\n"
+              "before = dict(matplotlib.rcParams)\n"
+              f"drawn = bergtow.plot_force({str(towed)!r})._repr_png_()\n"
+              "print(before == dict(matplotlib.rcParams), 'matplotlib.pyplot' in sys.modules, sys.modules['style'], "
+              "hashlib.sha256(drawn).hexdigest())")
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment())
-    assert said.stdout.split() == ["False", "None"], said.stderr
+    assert said.stdout.split() == ["True", "False", "None", hashlib.sha256(plain).hexdigest()], said.stderr
 
 
 def test_a_package_that_is_missing_is_named(towed, tmp_path):
@@ -145,7 +151,7 @@ def test_progress(tmp_path, capsys):
 @pytest.mark.slow
 def test_statistics_of_an_ensemble(speeds, tmp_path):
     found = bergtow.Ensemble(speeds).statistics(resamples=99, time_scale=1)
-    drawn_by("ensemble.py", speeds, "-o", tmp_path, "--resamples", "99", "--time-scale", "1")
+    drawn_by("statistics", speeds, "-o", tmp_path, "--resamples", "99", "--time-scale", "1")
     assert found == json.loads((tmp_path / "statistics.json").read_text())
     table = bergtow.Ensemble(speeds).dataframe
     means = table.groupby("tow.speed")["mean_ice_resistance_n"].mean()
@@ -155,7 +161,7 @@ def test_statistics_of_an_ensemble(speeds, tmp_path):
 @pytest.mark.slow
 def test_pictures_of_an_ensemble(speeds, tmp_path):
     pictures = bergtow.plot_ensemble(speeds)
-    drawn_by("plot_ensemble.py", speeds, "-o", tmp_path)
+    drawn_by("plot-ensemble", speeds, "-o", tmp_path)
     theirs = {p.stem: p.read_bytes() for p in tmp_path.glob("*.png")}
     assert {name: p._repr_png_() for name, p in pictures.items()} == theirs and "sweep-tow-speed" in theirs
     assert pictures["sweep-tow-speed"].save(tmp_path / "x.svg").read_text().startswith("<?xml")
@@ -177,45 +183,54 @@ def test_reports(towed, speeds, tmp_path):
 
 @pytest.mark.slow
 def test_the_wheel_has_the_command(towed, tmp_path):
-    """Installed by pip, with nothing of the source tree in reach."""
+    """Installed by pip, with nothing of the source tree in reach: those of the package, and of the program."""
     env = environment(BERGTOW_LIB=str(LIBRARY))
     env.pop("PYTHONPATH", None)
-    command = installed_by_pip(tmp_path) / "bergtow-report"
-    said = subprocess.run([command, towed, "-o", tmp_path / "x.html"], capture_output=True, text=True, env=env)
+    command = installed_by_pip(tmp_path) / "bergtow"
+    said = subprocess.run([command, "report", towed, "-o", tmp_path / "x.html"], capture_output=True, text=True,
+                          env=env)
     assert said.returncode == 0 and (tmp_path / "x.html").stat().st_size > 1e5, said.stderr
-    said = subprocess.run([command, tmp_path / "none"], capture_output=True, text=True, env=env)
-    assert said.returncode == 4 and said.stderr.startswith("bergtow-report: ") and "Traceback" not in said.stderr
+    said = subprocess.run([command, "report", tmp_path / "none"], capture_output=True, text=True, env=env)
+    assert said.returncode == 4 and said.stderr.startswith("bergtow report: ") and "Traceback" not in said.stderr
+    said = subprocess.run([command, "--version"], capture_output=True, text=True, env=env)
+    assert said.stdout == call("--version").stdout, said.stderr
+    env |= {"BERGTOW_LIB": str(tmp_path), "PATH": str(command.parent)}  # where it does not call itself
+    env.pop("BERGTOW", None)
+    said = subprocess.run([command, "run", "x.yml"], capture_output=True, text=True, env=env)
+    assert said.returncode == 4 and "install it with `make install`" in said.stderr
 
 
 @pytest.mark.slow
 def test_make_install_has_the_command(towed, tmp_path):
     make("install", f"PREFIX={tmp_path / 'usr'}")
     (tmp_path / "bin").mkdir()
-    (tmp_path / "bin/bergtow-report").symlink_to(tmp_path / "usr/bin/bergtow-report")
-    said = subprocess.run([tmp_path / "bin/bergtow-report", towed, "-o", tmp_path / "x.html"], capture_output=True,
-                          text=True, env=environment())
-    assert said.returncode == 0 and "x.html" in said.stdout, said.stderr
-    said = subprocess.run([tmp_path / "bin/bergtow-report", "--help"], capture_output=True, text=True,
+    command = tmp_path / "bin/bergtow"
+    command.symlink_to(tmp_path / "usr/bin/bergtow")
+    said = subprocess.run([command, "report", towed, "-o", tmp_path / "x.html"], capture_output=True, text=True,
                           env=environment())
-    assert said.stdout.startswith("usage: bergtow-report ")
+    assert said.returncode == 0 and "x.html" in said.stdout, said.stderr
+    assert subprocess.run([command, "report", "--help"], capture_output=True, text=True, env=environment()
+                          ).stdout.startswith("usage: bergtow report ")
 
 
-@pytest.mark.slow
-def test_the_source_tree_has_the_command(towed, tmp_path):
-    """Not the package: nothing has been put anywhere, and what is missing is told by a line."""
-    command = ROOT / "install/bergtow-report"
-    env = environment()
-    for name in ("PYTHONPATH", "BERGTOW_HOME", "PYTHON"):
-        env.pop(name, None)
-    said = subprocess.run([command, towed, "-o", tmp_path / "x.html"], capture_output=True, text=True, env=env)
-    assert said.returncode == 0 and (tmp_path / "x.html").stat().st_size > 1e5, said.stderr
-    for extra, words in ({"BERGTOW_HOME": "/nowhere"}, "BERGTOW_HOME"), ({"PYTHON": "/nowhere"}, "PYTHON"):
-        said = subprocess.run([command, towed], capture_output=True, text=True, env=env | extra)
-        assert said.returncode == 4 and said.stderr.startswith("bergtow-report: /nowhere") and words in said.stderr
+def test_what_the_commands_of_python_need_is_said(towed):
+    for extra, words in ({"BERGTOW_HOME": "/nowhere"}, "pip install ./postproc"), ({"PYTHON": "/nowhere"}, "PYTHON"):
+        said = call("report", towed, env=environment(**extra))
+        assert said.returncode == 4 and "/nowhere" in said.stderr and words in said.stderr
 
 
 def test_findings_are_taken_from_folders_that_have_some(towed, speeds, tmp_path):
     for folder in towed, speeds:
-        said = subprocess.run([ROOT / "install/bergtow-report", folder, "-o", tmp_path / "x.html", "--also", tmp_path],
-                              capture_output=True, text=True, env=environment())
+        said = call("report", folder, "-o", tmp_path / "x.html", "--also", tmp_path)
         assert said.returncode == 4 and "--also" in said.stderr and not (tmp_path / "x.html").exists()
+
+
+@pytest.mark.slow
+def test_what_is_found_out_by_runs(tmp_path):
+    """converge and capability as functions: what the file has, and a refusal as an exception."""
+    write_case(tmp_path, changed(TOWED, run__duration=4), "case.yml")
+    found = bergtow.converge(tmp_path / "case.yml", tmp_path / "out", vary="tolerance", set={"ice.friction": 0.2})
+    assert found == json.loads((tmp_path / "out/converge.json").read_text()) and found["set"] == ["ice.friction=0.2"]
+    with pytest.raises(bergtow.BergtowError, match="no such file") as refused:
+        bergtow.capability(tmp_path / "none.yml", tmp_path / "out")
+    assert refused.value.status == 4

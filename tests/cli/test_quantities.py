@@ -17,7 +17,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -29,16 +28,15 @@ import resuming
 from harness import (BERGTOW, DONE, ROOT, TOW, call, changed, differing, environment, launcher, machine_keys, quick,
                      script, write_case)
 
-sys.path.insert(0, str(ROOT / "postproc"))
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import force as plot_force
+from bergtow.plot import resistance as plot_resistance
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import run as report_run
+from bergtow.result.members import Members
+from bergtow.result.run import Run
 
-import plot_ensemble  # noqa: E402
-import plot_force  # noqa: E402
-import plot_resistance  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_run  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("look")
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
 SPEED = changed(TOW, run__duration=12, output__window_start=4, tow__ramp=8)
 #: cases, and what each has of "with a ..." and "where ..."
@@ -242,10 +240,10 @@ def test_every_number_of_a_member_is_in_the_ensemble(ensemble):
 
 @pytest.mark.slow
 def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_path):
-    done = script("ensemble.py", ensemble, "--resamples", 50)
+    done = script("statistics", ensemble, "--resamples", 50)
     assert done.returncode == 0, done.stderr
     assert "energy of the strip" in done.stdout
-    e = Ensemble(ensemble)
+    e = Members(ensemble)
     assert e.estimates["strip_energy"] == {"label": "energy of the strip", "on_top": False
                                            } and e.estimates["open_water_drag"]["on_top"]
     assert np.all(e.summary["max_moving_ice_kg"] > 0) and np.all(np.isfinite(e.summary["mean_carried_water_force_n"]))
@@ -353,7 +351,7 @@ def test_python_names_no_estimate():
     """A list of names in postproc/ would miss the one that is added."""
     names = [e["name"] for e in listed()["estimates"]]
     found = [
-        f"{path.name}: {name}" for path in Path(ROOT / "postproc").glob("*.py") for name in names
+        f"{path.name}: {name}" for path in Path(ROOT / "postproc").glob("bergtow/**/*.py") for name in names
         if name in path.read_text()
     ]
     assert found == []

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Where floes lie over each other, as pictures show it: against areas worked out by hand, and against the run's own
 number."""
-import sys
 
 import matplotlib
 import numpy as np
 import pytest
 
-from harness import ROOT, TOW, changed, placed, run
+from harness import TOW, changed, placed, run
 
-sys.path.insert(0, str(ROOT / "postproc"))
 matplotlib.use("Agg")
-import plot_field  # noqa: E402
-import rafted  # noqa: E402
-from bergtow_read import Run as Reader  # noqa: E402
+from bergtow.plot import field as plot_field  # noqa: E402
+from bergtow.result import overlaps as rafted  # noqa: E402
+from bergtow.result.run import Run as Reader  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("look")
 SQUARE = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
 PRESSED = changed(TOW,
                   domain={"length": 15, "width": 8, "ends_closing": 0.15},

@@ -12,15 +12,13 @@ with the area a s over other ice, (2/κ) q0 a s of potential energy, q0 a s of w
 Red when the bound of one contact is taken twice, friction of the sheets is of all rows at once, body or wall raft, or
 a number of the summary is of another kind.
 """
-import sys
 
 import numpy as np
 import pytest
 
-from harness import ROOT, run
+from harness import run
 
-sys.path.insert(0, str(ROOT / "postproc"))
-import plot_chains  # noqa: E402
+from bergtow.plot import chains as plot_chains
 
 A, H, MU, KAPPA, V, DT = 2.0, 0.2, 0.3, 8, 0.01, 0.1
 RHO_W, RHO_I, G = 1000.0, 920.0, 9.81

@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import shutil
-import sys
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,20 +19,20 @@ import harness
 from harness import TOW, call, changed, run, texts, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
-sys.path.insert(0, str(POSTPROC))
 
-import command  # noqa: E402
-import rafted  # noqa: E402
-import replay as replay_data  # noqa: E402
-import report  # noqa: E402
-import report_case  # noqa: E402
-import report_run  # noqa: E402
-import statement  # noqa: E402
-import style  # noqa: E402
-from bergtow_read import Run  # noqa: E402
+from bergtow import cli, writing
+from bergtow.errors import BergtowError
+from bergtow.plot import style
+from bergtow.reporting import page as report
+from bergtow.reporting import replay as replay_data
+from bergtow.reporting import run as report_run
+from bergtow.result import origins as report_case
+from bergtow.result import overlaps as rafted
+from bergtow.result.run import Run
+from bergtow.stats import design_value as statement
 
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
-OLD = f"an old page, {command.MARK}"
+OLD = f"an old page, {writing.MARK}"
 CASE = changed(TOW,
                output=None,
                run__title=HOSTILE,
@@ -61,13 +60,13 @@ RAFTS = changed(TOW,
 
 
 def script(*arguments):
-    return harness.script("report.py", *arguments)
+    return harness.script("report", *arguments)
 
 
 def page_without_pictures(folder, path, monkeypatch, *arguments):
     """A page made in this process; drawing its pictures would take most of the time."""
     monkeypatch.setattr(report_run, "pictures", lambda _: [])
-    report.main([str(folder), "-o", str(path), *arguments])
+    cli.perform("report", folder, "-o", path, *arguments)
     return path
 
 
@@ -518,9 +517,9 @@ def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, har
 
 def test_usage():
     for arguments in (["x", "-o", "page.png"], ["x", "--size", "0"], ["x", "--size", "nan"], []):
-        with pytest.raises(SystemExit) as left:
-            report.main(arguments)
-        assert left.value.code == 2
+        with pytest.raises(BergtowError) as left:
+            cli.perform("report", *arguments)
+        assert left.value.status == 2
 
 
 GIVEN = """# Title.

@@ -5,8 +5,6 @@ import argparse
 import json
 import re
 import shutil
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -17,18 +15,16 @@ from browser import browser, complaints, opened
 from harness import TOW, call, changed, write_case
 from made_up_ensemble import FAILED, WAITING, member
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
-
-import ensemble  # noqa: E402
-import loads_text  # noqa: E402
-import report  # noqa: E402
-import report_case  # noqa: E402
-import report_ensemble  # noqa: E402
-import report_method  # noqa: E402
-import stat_budget  # noqa: E402
-from bergtow_read import RunError  # noqa: E402
-from command import plain  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow import cli
+from bergtow.errors import RunError
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.reporting import method as report_method
+from bergtow.result import origins as report_case
+from bergtow.result.members import Members
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import variance as stat_budget
+from bergtow.text import loads as loads_text
+from bergtow.writing import plain
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
 JAM = "the towed body stood still for 40 s of 600 s <i>: a jam"
@@ -59,7 +55,7 @@ def page(study, tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     path = tmp_path_factory.mktemp("elsewhere") / "page.html"
-    report.main([str(study), "-o", str(path)])
+    cli.perform("report", study, "-o", path)
     patch.undo()
     with browser(tmp_path_factory.mktemp("profile")) as driver:
         driver.requests = [r for r in opened(driver, path) if not r.startswith("data:")]
@@ -87,7 +83,7 @@ def newtons(text):
 
 @pytest.mark.slow
 def test_numbers_are_those_of_the_statistics(page, study):
-    s = ensemble.statistics(Ensemble(study), argparse.Namespace(**OPTIONS))
+    s = ensemble.statistics(Members(study), argparse.Namespace(**OPTIONS))
     found = tables(page)
     head, *rows = found["Mean ice resistance"]
     factor = 1000.0 if "kN" in head[2] else 1.0
@@ -108,7 +104,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
 def test_the_answer_is_the_design_statement(tmp_path):
     """Rounded to what the interval leaves; of fields that are long enough for a tail."""
     rng = np.random.default_rng(8)
-    e = Ensemble(made_up.write(tmp_path / "out", [
+    e = Members(made_up.write(tmp_path / "out", [
         member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, [], {})
@@ -163,7 +159,7 @@ def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode)
                       attributes={"tow_force": line | {"role": "balance", "needs": "body"},
                                   "line_tension_1": line})
     folder = made_up.write(tmp_path / "out", [one(c) for c in (0, 1) for _ in range(4)])
-    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    cli.perform("report", folder, "-o", tmp_path / "page.html")
     text, there = (tmp_path / "page.html").read_text(), mode == "line"
     assert ("Design tow force and line tension in broken ice" in text) == there == ("Line tensions are" in text)
     assert ("Design tow force in broken ice" in text) != there and "statistics.json" not in text
@@ -203,16 +199,16 @@ def test_page_stands_alone_and_text_stays_text(page):
 def test_members_of_other_builds_and_lost_folders_are_reported(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
-    made_up.record(study / "members/c001-r001", Ensemble(study).study)
-    e = Ensemble(study)
+    made_up.record(study / "members/c001-r001", Members(study).study)
+    e = Members(study)
     assert "2 builds" in e.builds
     assert "2 builds" in " ".join(report_ensemble.context(study)["warnings"])
     (study / "members/c001-r002").rename(study / "members/lost")
-    assert Ensemble(study).without_folder == ["c001-r002"]
+    assert Members(study).without_folder == ["c001-r002"]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
-    assert not Ensemble(study).builds
+    assert not Members(study).builds
 
 
 @pytest.mark.slow
@@ -243,7 +239,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     for name, content in found.items():
         (folder / f"{name}.json").write_text(json.dumps(plain(content)))
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
-    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    cli.perform("report", folder, "-o", tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
     at = [text.rindex(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
                                           "every value of the range makes it")]
@@ -271,7 +267,7 @@ def test_a_quantity_has_one_verdict(tmp_path):
     def said(name, **keys):
         case = "run:\n  dt: {dt}\ndomain:\n  width: {width}\n".format(**{"dt": "2 s", "width": "10 m"} | keys)
         some = [member(np.ones(50), {}, 0, case=case, start=10.0) for _ in range(2)]
-        e = Ensemble(made_up.write(tmp_path / name, some))
+        e = Members(made_up.write(tmp_path / name, some))
         return dict(report_method.beyond({"converge": {"rows": rows}}, e))["width, length, time step, tolerance, start"]
     assert said("a") == "it depends on dt; open is length; no effect that matters of width, window"
     assert said("b", dt="1 s") == "open is length; no effect that matters of dt, width, window"
@@ -282,7 +278,7 @@ def test_a_quantity_has_one_verdict(tmp_path):
 def test_results_of_another_case_or_of_before_are_doubted(tmp_path):
     case = "ice:\n  size: {} m\n"
     folder = made_up.write(tmp_path / "e", [member(np.ones(50), {}, 0, case=case.format(30)) for _ in range(2)])
-    e = Ensemble(folder)
+    e = Members(folder)
     def said(name, place=folder, **found):
         place.mkdir(exist_ok=True)
         (place / f"{name}.json").write_text(json.dumps(found))
@@ -336,7 +332,7 @@ variants:
     tow.speed: 0.2 m/s
 """)
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     cases = report_ensemble.statement.cases(e, s)
     limits = report_method.limits(cases)
@@ -389,7 +385,7 @@ def test_a_half_finished_ensemble(tmp_path, monkeypatch):
     folder = made_up.write(tmp_path / "half", some)
     (folder / "members/c002-r001").mkdir(exist_ok=True)
     (folder / "members/c002-r001/finished").write_text("")
-    report.main([str(folder)])
+    cli.perform("report", folder)
     text = (folder / "report.html").read_text()
     for part in ("3 of 9 members in 3 conditions.", "not complete: 6 members to come",
                  "1 member of these finished after ensemble.h5 was made",
@@ -413,16 +409,16 @@ def test_nothing_has_finished(tmp_path, status, behind, reported):
     if behind:
         (folder / "members/c001-r001/finished").write_text("")
     with pytest.raises(RunError) as error:
-        report.main([str(folder)])
+        cli.perform("report", folder)
     assert reported in str(error.value)
     (folder / "ensemble.h5").unlink()
     (folder / "study.resolved.yml").write_text("seed: 1\n")
     with pytest.raises(RunError, match="holds no ensemble.h5; .*run it again"):
-        report.main([str(folder)])
+        cli.perform("report", folder)
 
 
 def test_an_unusable_ensemble_is_reported(tmp_path, capsys, monkeypatch):
     (tmp_path / "ensemble.h5").write_bytes(b"no")
     with pytest.raises(RunError, match="is no ensemble"):
-        report.main([str(tmp_path)])
+        cli.perform("report", tmp_path)
     assert not (tmp_path / "report.html").exists()

@@ -8,7 +8,6 @@ import shutil
 import sys
 
 import h5py
-import matplotlib.pyplot
 import numpy as np
 import pytest
 
@@ -16,17 +15,16 @@ import made_up_ensemble as made_up
 import script_copy
 from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import force as plot_force
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.result.members import DOUBTS, Members
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import conditions as ensemble
+from bergtow.writing import plain as plain_data
 
-import ensemble  # noqa: E402
-import loads  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_force  # noqa: E402
-import report_ensemble  # noqa: E402
-from bergtow_read import Run  # noqa: E402
-from command import plain as plain_data  # noqa: E402
-from ensemble_read import DOUBTS, Ensemble  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("look")
 # Bridles that part in dense ice, short windows, and loose ice that a body hardly meets.
 CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=16, domain__width=6, ice__size=0.6,
                body__length=1, tow={"mode": "line", "speed": 0.15, "ramp": 5, "line_length": 2, "line_stiffness": 5000,
@@ -83,7 +81,7 @@ class Words:
 def reworded(folder, copy):
     """A copy of an ensemble's folder in other words."""
     shutil.copytree(folder, copy)
-    words, study = Words(), Ensemble(folder).study
+    words, study = Words(), Members(folder).study
     for member in (copy / "members").iterdir():
         if (member / "finished").exists():
             words.in_summary(member / "summary.json")
@@ -115,7 +113,6 @@ def drawn(figure):
         legend = axes.get_legend()
         said += [axes.get_xlabel(), axes.get_ylabel(), *(t.get_text() for t in (legend.get_texts() if legend else ()))]
     said += [t.get_text() for t in figure.texts]
-    matplotlib.pyplot.close(figure)
     return numbers, said
 
 
@@ -128,7 +125,7 @@ def test_statistics_and_pictures_of_an_ensemble(both):
     """Red at a regular expression for "the last line parted at", digits stripped from a reason, warnings counted
     beyond the known checks, and words for what a series needs."""
     plain, other, words = both
-    first, second = Ensemble(plain), Ensemble(other)
+    first, second = Members(plain), Members(other)
     doubts = [first.doubts(m) for m in range(first.n)]
     assert doubts == [second.doubts(m) for m in range(second.n)]
     assert set().union(*doubts) >= {"unsteady", "short", "few"}
@@ -150,11 +147,11 @@ def test_statistics_and_pictures_of_an_ensemble(both):
 def test_statistics_without_the_folders_of_the_members(both, tmp_path):
     """What of them is in ensemble.h5 is the same, and known by codes."""
     plain, other, _ = both
-    e = Ensemble(plain)
+    e = Members(plain)
     for folder in (plain, other):
         (alone := tmp_path / folder.name).mkdir()
         shutil.copy(folder / "ensemble.h5", alone)
-        there = Ensemble(alone)
+        there = Members(alone)
         assert np.array_equal(there.mean, e.mean, equal_nan=True) and there.without_mean == e.without_mean
         for m in range(e.n):
             assert there.doubts(m) == e.doubts(m) and there.adrift(m) == e.adrift(m)
@@ -168,7 +165,7 @@ def test_statistics_without_the_folders_of_the_members(both, tmp_path):
 def test_the_picture_of_a_run(both):
     plain, other, words = both
     for m in (0, 8):
-        with Run(Ensemble(plain).folder(m)) as one, Run(Ensemble(other).folder(m)) as two:
+        with Run(Members(plain).folder(m)) as one, Run(Members(other).folder(m)) as two:
             assert one.verdict[0] == two.verdict[0]
             (numbers, _), (again, _) = drawn(plot_force.draw(one)), drawn(plot_force.draw(two))
             assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(numbers, again))
@@ -191,7 +188,7 @@ def test_every_doubt_follows_from_numbers_and_codes(tmp_path):
     plain = made_up.write(tmp_path / "plain", members)
     reworded(plain, tmp_path / "other")
     for folder in (plain, tmp_path / "other"):
-        assert [Ensemble(folder).doubts(m) for m in range(len(some))] == [wanted for _, _, wanted in some]
+        assert [Members(folder).doubts(m) for m in range(len(some))] == [wanted for _, _, wanted in some]
 
 
 def test_each_code_has_a_row_and_each_warning_a_code():
@@ -244,11 +241,11 @@ def test_commands_that_make_runs(tmp_path):
     found = {}
     for name, binary in (("plain", BERGTOW), ("other", str(program))):
         def made(script, *words):
-            return script_copy.called([str(ROOT / "postproc" / script), *words], tmp_path, environment()
+            return script_copy.called([script, *words], tmp_path, environment()
                                       | {"BERGTOW": binary, "OMP_NUM_THREADS": "1"}, 300)
-        whole = made("converge.py", "case.yml", "-o", name, "--vary", "tolerance", "--jobs", "2")
-        failed = made("converge.py", "fails.yml", "-o", f"{name}-fails", "--vary", "dt", "--jobs", "1")
-        spent = made("converge.py", "case.yml", "-o", f"{name}-spent", "--vary", "dt", "--jobs", "1",
+        whole = made("converge", "case.yml", "-o", name, "--vary", "tolerance", "--jobs", "2")
+        failed = made("converge", "fails.yml", "-o", f"{name}-fails", "--vary", "dt", "--jobs", "1")
+        spent = made("converge", "case.yml", "-o", f"{name}-spent", "--vary", "dt", "--jobs", "1",
                      "--budget", "0.001", "--set", "run.dt=0.0002 s")
         rows = json.loads((tmp_path / name / "converge.json").read_text())
         found[name] = ([done.returncode for done in (whole, failed, spent)], rows["rows"], rows["verdicts"])

@@ -8,7 +8,6 @@ import shutil
 from types import SimpleNamespace
 
 import h5py
-import matplotlib
 import numpy as np
 import pytest
 import shapely.geometry as shapely
@@ -18,15 +17,18 @@ import made_up_ensemble as made_up
 from harness import DONE, TOW, call, changed, run, script, write_case
 from test_postproc import done, pixels
 
-import ensemble  # noqa: E402  (test_postproc has put postproc/ on the path)
-import plot_chains  # noqa: E402
-import plot_ensemble  # noqa: E402
-import plot_sweep  # noqa: E402
-import soundness  # noqa: E402
-import stat_mean  # noqa: E402
-from bergtow_read import Run, RunError  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
+from bergtow import cli
+from bergtow.errors import BergtowError, RunError
+from bergtow.plot import chains as plot_chains
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.plot import sweep as plot_sweep
+from bergtow.result import integrity as soundness
+from bergtow.result.members import Members
+from bergtow.result.run import Run
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import mean as stat_mean
 
+pytestmark = pytest.mark.usefixtures("look")
 FIELDS, LENGTH = 8, 400
 
 
@@ -64,7 +66,7 @@ def plain(tmp_path_factory):
         return {"window": {"verdict": "too short"}, "warnings": [made_up.note("too_short"), made_up.note("floes_left")]
                 } if (c, r) == (2, 0) else {}
     folder = grid(tmp_path_factory.mktemp("plain") / "all", change=change)
-    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10, "--partial")
+    result = script("statistics", folder, "--resamples", 5, "--hours", 1, 10, "--partial")
     assert result.returncode == 0, result.stderr
     return folder, result, json.loads((folder / "statistics.json").read_text())
 
@@ -78,7 +80,7 @@ def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
                   "series": {"ice_resistance": {"change_n": drift + 10 * (r - 3.5)}}}
         code = window["verdict"].replace(" ", "_")
         return {"window": window, "warnings": [made_up.note(code)] if code != "steady" else []}
-    result = script("ensemble.py", grid(tmp_path / "all", change=change), "--resamples", 5)
+    result = script("statistics", grid(tmp_path / "all", change=change), "--resamples", 5)
     assert result.returncode == 0, result.stderr
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     drifts = [c["drift"] for c in s["conditions"]]
@@ -93,7 +95,7 @@ def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
         found = change(c, r)
         found["window"]["series"]["ice_resistance"]["change_n"] += 20 if c == 0 else 0
         return found
-    result = script("ensemble.py", grid(tmp_path / "more", change=more), "--resamples", 5)
+    result = script("statistics", grid(tmp_path / "more", change=more), "--resamples", 5)
     s = json.loads((tmp_path / "more/statistics.json").read_text())
     assert s["conditions"][0]["drift"]["verdict"] == "not steady" and s["conditions"][1]["drift"]["verdict"] == "steady"
     assert "NOT STEADY over all fields" in result.stdout and "rises by 40.0 N" in result.stdout
@@ -116,7 +118,7 @@ def test_each_field_counts_by_its_time():
 
 @pytest.mark.parametrize("word", ["--gap=-5", "--gap=nan", "--threshold=nan"])
 def test_what_no_peaks_are_counted_by_is_refused(plain, word):
-    result = script("ensemble.py", plain[0], word)
+    result = script("statistics", plain[0], word)
     assert result.returncode == 2 and word.partition("=")[0] in result.stderr and not result.stdout
 
 
@@ -164,7 +166,7 @@ def test_doubts_failures_and_gaps_are_counted(plain):
 @pytest.mark.slow
 def test_exclude_names_what_it_drops(plain, tmp_path):
     folder, _, before = plain
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude",
+    result = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude",
                     "short", "--partial")
     s = json.loads((tmp_path / "statistics.json").read_text())
     assert s["excluded"] == {"c001-r008": ["jammed"], "c003-r001": ["short"]
@@ -205,7 +207,7 @@ def unlike(a, b, at=""):
 @pytest.mark.slow
 def test_markdown_and_stable_numbers(plain, tmp_path):
     folder, result, s = plain
-    again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown", "--partial")
+    again = script("statistics", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown", "--partial")
     assert list(unlike(s, json.loads((tmp_path / "statistics.json").read_text()))) == []
     lines = again.stdout.splitlines()
     tables = [line for line in lines if line.startswith("|")]
@@ -259,7 +261,7 @@ def test_a_run_that_is_there_twice_counts_once(tmp_path):
     """Ice that is read is the same for each seed."""
     some = [made_up.member(np.full(50, 100.0 + 10 * (r % 2) + c), {"ice.friction": 0.1 * (c + 1)}, c,
                            state="ab"[r % 2] if c == 0 else None) for c in range(2) for r in range(4)]
-    result = script("ensemble.py", made_up.write(tmp_path / "all", some), "--resamples", 1)
+    result = script("statistics", made_up.write(tmp_path / "all", some), "--resamples", 1)
     assert result.returncode == 0, result.stderr
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     assert [c["resistance"]["n"] for c in s["conditions"]] == [2, 4]
@@ -274,7 +276,7 @@ def test_a_member_that_met_little_ice_is_known_without_its_folder(tmp_path):
             for k, more in enumerate(({"n_contact_stretches": 2.5}, {"n_contact_stretches": 12.0}, {}))]
     folder = made_up.write(tmp_path / "all", made)
     for there in (True, False):
-        assert [Ensemble(folder).doubts(m) for m in range(3)] == [{"few"}, {"short"}, {"short"}], there
+        assert [Members(folder).doubts(m) for m in range(3)] == [{"few"}, {"short"}, {"short"}], there
         shutil.rmtree(folder / "members", ignore_errors=True)
 
 
@@ -288,7 +290,7 @@ def test_doubts_are_known_without_the_folders_and_by_codes_alone(tmp_path):
         {"window": {"verdict": "steady"}}))]
     folder = made_up.write(tmp_path / "all", made)
     for _ in range(2):
-        e = Ensemble(folder)
+        e = Members(folder)
         assert [e.doubts(m) for m in range(4)] == [{"unsteady"}, {"short", "other"}, {"few", "other"}, set()]
         assert [w["code"] for w in e.warnings(1)] == ["too_short", "overlap"]
         shutil.rmtree(folder / "members", ignore_errors=True)
@@ -298,38 +300,38 @@ def test_members_of_two_builds_are_reported(tmp_path):
     folder = made_up.write(tmp_path / "all", [made_up.member(np.ones(50) + k, {}, 0) for k in range(3)])
     with h5py.File(folder / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
-    made_up.record(folder / "members/c001-r001", Ensemble(folder).study)
-    result = script("ensemble.py", folder, "--resamples", 1)
+    made_up.record(folder / "members/c001-r001", Members(folder).study)
+    result = script("statistics", folder, "--resamples", 1)
     assert "The members come from 2 builds of the program" in result.stdout
     assert "2 builds" in json.loads((folder / "statistics.json").read_text())["builds"]
 
 
 def test_what_is_refused(tmp_path, plain, capsys):
-    result = script("ensemble.py", tmp_path / "none")
+    result = script("statistics", tmp_path / "none")
     assert result.returncode == 4 and "no such folder" in result.stderr and "Traceback" not in result.stderr
     for arguments, words in (((tmp_path, ), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5",
                                                                        "--resamples", "1", "--partial"),
                                                                       "cannot be written")):
         with pytest.raises(RunError, match=words):
-            ensemble.main([str(a) for a in arguments])
+            cli.perform("statistics", *arguments)
     for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"),
                              (("--exclude", "few"), "invalid choice"),  # the small means would go
                              (("--blocks", "0"), "below 1")):
-        with pytest.raises(SystemExit) as stop:
-            ensemble.main([str(plain[0]), *arguments])
-        assert stop.value.code == 2 and words in capsys.readouterr().err
+        with pytest.raises(BergtowError, match=words) as stop:
+            cli.perform("statistics", str(plain[0]), *arguments)
+        assert stop.value.status == 2
     (tmp_path / "ensemble.h5").write_bytes(b"no HDF5")
     with pytest.raises(RunError, match="is no ensemble"):
-        Ensemble(tmp_path)
+        Members(tmp_path)
     waiting = made_up.write(tmp_path / "w", [made_up.member([1.0] * 30, {}, 0, status=made_up.WAITING)])
-    for main in (ensemble.main, plot_ensemble.main):
+    for command in ("statistics", "plot-ensemble"):
         with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
-            main([str(waiting)])
+            cli.perform(command, waiting)
     mixed = made_up.write(tmp_path / "m", [
         made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c)
         for c in ("half-sine of 0.1 s", "crushing")
     ])
-    ensemble.main([str(mixed)])
+    cli.perform("statistics", mixed)
     assert "peaks of different conversions" in capsys.readouterr().out
 
 
@@ -338,7 +340,7 @@ def test_no_part_is_taken_for_the_whole(plain, tmp_path):
     """Members that fail or wait are named, and a script sees it by the exit code."""
     folder, complete, _ = plain
     assert complete.stderr == ""
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1)
+    result = script("statistics", folder, "-o", tmp_path, "--resamples", 1)
     assert (result.returncode == 4
             and "2 of 48 members are in no number: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr
             and "--partial" in result.stderr)
@@ -373,12 +375,12 @@ def test_a_damaged_member_is_in_no_number(tmp_path, damage):
     folder = made_up.write(
         tmp_path / "a", [made_up.member(np.arange(30.0) + 10 * r, {}, 0, peaks=([2.0 + r], [5.0])) for r in range(3)])
     DAMAGES[damage](folder / "members" / "c001-r001")
-    result = script("ensemble.py", folder, "--resamples", 1)
+    result = script("statistics", folder, "--resamples", 1)
     s = json.loads((folder / "statistics.json").read_text())
     assert (result.returncode == 4 and "1 of 3 members are in no number: 1 not sound (c001-r001)" in result.stderr
             and "Traceback" not in result.stderr)
     assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"
-                                                                                                      ] and s["checked"]
+                                                                                                      ]
     assert s["behind"] == []  # its record of an end is no news
     assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"][
         "fields"] == 2
@@ -387,25 +389,17 @@ def test_a_damaged_member_is_in_no_number(tmp_path, damage):
 def test_the_record_of_a_member_is_that_of_its_study(tmp_path):
     """A member of another study, whatever its files, is none of this one."""
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0)])
-    member, study = folder / "members/c001-r001", Ensemble(folder).study.encode()
+    member, study = folder / "members/c001-r001", Members(folder).study.encode()
     assert soundness.fault_of_member(member, "c001-r001", study) is None
-    assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "its record `finished` is of another run"
+    assert soundness.fault_of_member(member, "c001-r001", study + b"\n") == "finished: is of another study"
 
 
 def test_a_damaged_ensemble_file_is_refused(tmp_path):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0) for _ in range(2)])
-    assert Ensemble(folder).n == 2
+    assert Members(folder).n == 2
     flip(folder / "ensemble.h5", (folder / "ensemble.h5").stat().st_size - 9)
-    with pytest.raises(RunError, match="do not fit their seal; run `bergtow ensemble` again"):
-        Ensemble(folder)
-
-
-def test_what_cannot_be_checked_is_reported(tmp_path, monkeypatch, capsys):
-    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + r, {}, 0) for r in range(2)])
-    monkeypatch.setattr(soundness, "_XXH3", None)
-    monkeypatch.setattr(soundness, "xxhash", None)
-    ensemble.main([str(folder), "--resamples", "1"])
-    assert "was not checked" in capsys.readouterr().out
+    with pytest.raises(RunError, match="do not fit their digest; run `bergtow ensemble` again"):
+        Members(folder)
 
 
 def test_members_without_a_folder_are_reported(tmp_path, capsys):
@@ -413,7 +407,7 @@ def test_members_without_a_folder_are_reported(tmp_path, capsys):
         tmp_path / "a",
         [made_up.member(np.arange(30.0) + r, {}, 0, summary={"unconverged_steps": 1}) for r in range(3)])
     (folder / "members").rename(folder / "elsewhere")
-    ensemble.main([str(folder)])
+    cli.perform("statistics", folder)
     out = capsys.readouterr().out
     assert "3 members have no folder here" in out and "3 U" in out and "No peaks" in out
 
@@ -421,7 +415,7 @@ def test_members_without_a_folder_are_reported(tmp_path, capsys):
 # ---- pictures
 
 def test_the_law_of_the_speed_is_found(plain):
-    e = Ensemble(plain[0])
+    e = Members(plain[0])
     for words, some in plot_sweep.groups(e, "tow.speed"):
         exponent, low, high, _ = plot_sweep.power_law([c.values["tow.speed"] for c in some],
                                                       [plot_ensemble.of(e, c.finished) for c in some])
@@ -433,7 +427,7 @@ def test_the_law_of_the_speed_is_found(plain):
 
 
 def test_the_sweep_shows_fields_means_and_jams(plain):
-    e = Ensemble(plain[0])
+    e = Members(plain[0])
     figure = plot_ensemble.draw_sweep(e, "ice.concentration")
     panel = next(a for a in figure.axes if a.get_title(loc="left") == "tow speed 0.1 m/s")
     shown = np.concatenate([line.get_ydata() for line in panel.lines if line.get_marker() in ("o", "x")])
@@ -445,7 +439,6 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
     assert "Lichey-Hellmer" in labels and "dilute limit" in labels and "a field where the body stood still" in labels
     assert any(label.startswith("a field in doubt") for label in labels)
-    matplotlib.pyplot.close("all")
 
 
 def test_estimates_are_those_of_each_condition(tmp_path):
@@ -454,7 +447,7 @@ def test_estimates_are_those_of_each_condition(tmp_path):
     some = [made_up.member(np.full(30, 100.0) + r, {"ice.concentration": a}, c,
                            estimates={n: f * v * v for n, f in made_up.ESTIMATES.items()})
             for c, (a, v) in enumerate(speeds.items()) for r in range(2)]
-    axes = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
+    axes = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
     factor = 1 if "(N)" in axes.get_ylabel() else 1000
     drawn = {line.get_label(): line.get_data() for line in axes.lines if line.get_marker() == "d"}
     x, force = drawn["Lichey-Hellmer"]
@@ -463,33 +456,30 @@ def test_estimates_are_those_of_each_condition(tmp_path):
     assert np.isnan(drawn["compaction"][1]).all()  # not meant for these
     dotted = next(line for line in axes.lines if line.get_label() == "compaction" and line.get_marker() != "d")
     assert factor * dotted.get_ydata() == pytest.approx([5 * v * v for v in speeds.values()])
-    matplotlib.pyplot.close("all")
 
 
 def test_fields_beside_a_value_of_zero_are_in_the_picture(tmp_path):
     """Red when the axis begins at the least value: half of its fields stand left of it."""
     some = [made_up.member(np.full(30, 100.0 + w + r), {"tow.direction": w}, c)
             for c, w in enumerate((0.0, 0.5)) for r in range(4)]
-    e = Ensemble(made_up.write(tmp_path / "a", some))
+    e = Members(made_up.write(tmp_path / "a", some))
     axes = plot_ensemble.draw_sweep(e, "tow.direction").axes[0]
     dots = np.concatenate([line.get_xdata() for line in axes.lines if line.get_marker() == "o"])
     low, high = axes.get_xlim()
     assert len(dots) == 8 and low < dots.min() < 0 and dots.max() < high
-    matplotlib.pyplot.close("all")
 
 
 def test_negative_values_are_in_the_picture(tmp_path):
     some = [made_up.member(np.full(30, 100.0 + w + r), {"air.wind_x": w}, c)
             for c, w in enumerate((-10.0, 0.0, 10.0)) for r in range(2)]
-    low, high = plot_ensemble.draw_sweep(Ensemble(made_up.write(tmp_path / "a", some)), "air.wind_x").axes[0].get_xlim()
+    low, high = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "air.wind_x").axes[0].get_xlim()
     assert low < -10 and high > 10
-    matplotlib.pyplot.close("all")
 
 
 @pytest.mark.slow
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
-    result = script("plot_ensemble.py", plain[0], "-o", tmp_path)
+    result = script("plot-ensemble", plain[0], "-o", tmp_path)
     done(result, *(tmp_path / f"{name}.png" for name in names))
     assert len({pixels(tmp_path / f"{name}.png").tobytes() for name in names}) == 6
 
@@ -501,13 +491,12 @@ def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
         for i, (a, t) in enumerate(rng.random((40, 2)))
     ]
     folder = made_up.write(tmp_path / "a", members, sampling="latin-hypercube")
-    e = Ensemble(folder)
+    e = Members(folder)
     assert e.sampled and plot_ensemble.numeric(e) == ["ice.concentration", "ice.thickness"] and [
         n for n, _ in plot_ensemble.pictures(e, None, [])
     ][-1] == "sensitivity"
     dots = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].lines[0]
     assert list(dots.get_xdata()) == [m["parameters"]["ice.thickness"] for m in members]
-    matplotlib.pyplot.close("all")
 
 
 def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
@@ -515,7 +504,7 @@ def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
     rng = np.random.default_rng(3)
     some = [made_up.member(np.full(30, level + 0.01 * r), {"ice.thickness": float(t)}, c)
             for c, (t, level) in enumerate(zip(rng.random(24), rng.normal(100, 10, 24))) for r in range(6)]
-    e = Ensemble(made_up.write(tmp_path / "a", some, sampling="latin-hypercube"))
+    e = Members(made_up.write(tmp_path / "a", some, sampling="latin-hypercube"))
     bars = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].containers[0]
     at, centre = bars[0].get_data()
     half = [(s[1, 1] - s[0, 1]) / 2 for s in bars[2][0].get_segments()]
@@ -524,7 +513,6 @@ def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
     for k, one in enumerate(np.array_split(np.array(conditions), 3)):
         low, high = stat_mean.t_interval(one[:, 1])
         assert (at[k], centre[k], half[k]) == pytest.approx((*one.mean(axis=0), (high - low) / 2))
-    matplotlib.pyplot.close("all")
 
 
 def test_a_map_says_what_it_is_the_mean_of(tmp_path):
@@ -533,7 +521,7 @@ def test_a_map_says_what_it_is_the_mean_of(tmp_path):
         "ice.concentration": a, "tow.speed": v, "ice.thickness": t}, c)
         for c, (a, v, t) in enumerate((a, v, t) for a in (0.2, 0.5) for v in (0.1, 0.2) for t in (1.0, 2.0, 3.0))
         for r in range(4)]
-    e = Ensemble(made_up.write(tmp_path / "a", some))
+    e = Members(made_up.write(tmp_path / "a", some))
     e.seed[:] = np.arange(len(some)) % 4
     figure = plot_ensemble.draw_map(e, "ice.concentration", "tow.speed")
     assert any("mean of 3 conditions of thickness" in t.get_text() for t in figure.texts)
@@ -541,7 +529,6 @@ def test_a_map_says_what_it_is_the_mean_of(tmp_path):
     half = stats.t.ppf(0.975, 3) * np.std(range(4), ddof=1) / 2
     means = [100 * a + 10 * v + 2 + 1.5 for v in (0.1, 0.2) for a in (0.2, 0.5)]
     assert shown[:4] == [f"{m:.3g}" for m in means] and shown[4:] == [f"{100 * half / m:.0f} %" for m in means]
-    matplotlib.pyplot.close("all")
 
 
 def test_pictures_name_every_conversion(tmp_path):
@@ -550,12 +537,11 @@ def test_pictures_name_every_conversion(tmp_path):
     def label(second):
         some = [made_up.member(np.ones(30), {"ice.concentration": a}, c, peaks=peaks, conversion=how)
                 for c, (a, how) in enumerate([(0.2, "half-sine of 0.1 s"), (0.5, second)]) for _ in range(2)]
-        e = Ensemble(made_up.write(tmp_path / second, some))
+        e = Members(made_up.write(tmp_path / second, some))
         tails = [{"refused": "few"}] * 2
         return plot_ensemble.draw_exceedance(e, None, tails).axes[0].get_xlabel()
     assert label("half-sine of 0.1 s") == "peak of a collision (N), half-sine of 0.1 s"
     assert label("crushing") == "peak of a collision (N), each condition by its own impact.conversion"
-    matplotlib.pyplot.close("all")
 
 
 # ---- with the program
@@ -577,9 +563,9 @@ def test_a_small_ensemble_of_the_program(tmp_path):
             "parameters": {"ice.concentration": [0.2, 0.5]}
         }))
     assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
-    result = script("ensemble.py", tmp_path / "all", "--resamples", 9)
+    result = script("statistics", tmp_path / "all", "--resamples", 9)
     assert result.returncode == 0, result.stderr
-    e, s = Ensemble(tmp_path / "all"), json.loads((tmp_path / "all/statistics.json").read_text())
+    e, s = Members(tmp_path / "all"), json.loads((tmp_path / "all/statistics.json").read_text())
     assert [c["members"]["used"] for c in s["conditions"]] == [5, 5]
     for m in range(e.n):  # the program and the script estimate the same mean, error and correlation time
         with Run(e.folder(m)) as r:
@@ -597,7 +583,7 @@ def test_a_small_ensemble_of_the_program(tmp_path):
         assert c["resistance"]["mean"] == pytest.approx(
             np.mean([e.summary["mean_ice_resistance_n"][m] for m in e.conditions()[c["index"]].finished]))
         assert c["extremes"]["collisions"] > 0 and c["estimates"]["dilute_limit"]["force"] > 0
-    done(script("plot_ensemble.py", tmp_path / "all"), tmp_path / "all/returns-floe-force.png",
+    done(script("plot-ensemble", tmp_path / "all"), tmp_path / "all/returns-floe-force.png",
          tmp_path / "all/sweep-ice-concentration.png", tmp_path / "all/exceedance.png")
     # what the made-up files claim to look like
     ours, theirs = flat_names(
@@ -663,9 +649,9 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
                                    np.array([1.0, 3.0, 0.0]), np.zeros((3, 3)))
     body, lever, total = plot_chains.pairs(by_hand)
     assert body.tolist() == [[0, 1]] and lever.tolist() == [[[3, 0], [2, 6]]] and total.tolist() == [4]
-    done(script("plot_chains.py", tmp_path / "out", tmp_path / "c.h5"), tmp_path / "out/chains.png")
+    done(script("plot-chains", tmp_path / "out", tmp_path / "c.h5"), tmp_path / "out/chains.png")
     with pytest.raises(RunError, match="no such file"):
         plot_chains.read(tmp_path / "none.h5")
     with h5py.File(tmp_path / "c.h5", "a") as f:
         del f["places"]
-    assert "does not say where" in script("plot_chains.py", tmp_path / "out", tmp_path / "c.h5").stderr
+    assert "does not say where" in script("plot-chains", tmp_path / "out", tmp_path / "c.h5").stderr

@@ -298,7 +298,7 @@ def test_the_runs_in_a_map_are_those_that_check_takes(tmp_path):
     rng = np.random.default_rng(4)
     rings = [SQUARE * 0.3 + [x, y] for x in range(1, 6) for y in range(3, 19) if rng.random() < 0.7]
     (tmp_path / "floes.pkl").write_bytes(of_this_day(pickle.dumps([floe(r) for r in rings], protocol=4)))
-    a = argparse.Namespace(map=tmp_path / "floes.pkl", out=tmp_path / "out", fields=1)
+    a = argparse.Namespace(map=tmp_path / "floes.pkl", out=tmp_path / "out", fields=1, bergtow=BERGTOW)
     a.out.mkdir()
     todo = ship.jobs_of_map(a)
     assert len(todo) == 2 * 4 * len(ship.LANES) + 3 and len({name for _, name, _ in todo}) == len(todo)

@@ -10,12 +10,11 @@ import yaml
 import made_up_ensemble
 from harness import ROOT, call, write_case
 
-sys.path.insert(0, str(ROOT / "postproc"))
+from bergtow import cli
+from bergtow.plot import variants as plot_variants
+from bergtow.result.members import Members
 
-import plot_ensemble  # noqa: E402
-import plot_variants  # noqa: E402
-from ensemble_read import Ensemble  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("look")
 BASE = {
     "run": {"title": "t", "dt": 0.1, "duration": 6}, "domain": {"length": 16, "width": 8},
     "ice": {"concentration": 0.3, "size": 1, "thickness": 0.1, "shape": "polygons"},
@@ -58,7 +57,7 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
     (tmp_path / "study.yml").write_text(yaml.safe_dump(study, sort_keys=False))
     result = call("ensemble", "study.yml", "-o", "out", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    e = Ensemble(tmp_path / "out")
+    e = Members(tmp_path / "out")
     some = plot_variants.panels(e)
     assert [words for words, *_ in some] == ["concentration 30 %", "concentration 50 %"]
     for k, (_, first, mean, changes) in enumerate(some):
@@ -71,7 +70,7 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
             np.testing.assert_allclose([of, change], [means[name], 100 * (means[name] / mean - 1)], rtol=1e-9)
             assert half > 0
         assert changes[1][2] > 20, "twice the mass of ice loads the body more"
-    plot_ensemble.main([str(tmp_path / "out")])
+    cli.perform("plot-ensemble", tmp_path / "out")
     assert (tmp_path / "out/variants.png").stat().st_size > 10000
 
 

@@ -87,10 +87,11 @@ def test_a_failure_is_told(container):
 
 def test_reports_and_statistics_have_what_they_need(container):
     container("bergtow", *CASE, "-o", "towed", user=f"{SOMEONE}:{SOMEONE}")
-    container("bergtow-report", "towed", user=f"{SOMEONE}:{SOMEONE}")
+    container("bergtow", "report", "towed", user=f"{SOMEONE}:{SOMEONE}")
     assert (container.data / "towed/report.html").stat().st_size > 1e5
     # SciPy is unpacked, not installed, and loads its parts where they are first used: what these need must be there
-    texts = {p.stem: p.read_text() for p in (ROOT / "postproc").glob("*.py")}
+    package = ROOT / "postproc"
+    texts = {".".join(p.relative_to(package).with_suffix("").parts): p.read_text() for p in package.glob("*/*/*.py")}
     scripts = [name for name, text in texts.items() if re.search(r"^import scipy$", text, re.M)]
     parts = {f"scipy.{part}" for name in scripts for part in re.findall(r"\bscipy\.([a-z]+)\.", texts[name])}
     assert len(scripts) > 5 and len(parts) > 2, (scripts, parts)

@@ -48,7 +48,7 @@ def test_the_program_its_cases_and_its_scripts(usr, tmp_path):
     called(program, "run", basin, "-o", "ten", "--steps", 10, "--quiet", cwd=tmp_path)
     called(program, "run", basin, "-o", "run", "--set", "run.duration=10", "--set", "output.window_start=5", "--quiet",
            cwd=tmp_path)
-    called(usr / "bin/bergtow-report", "run", "-o", "run.html", cwd=tmp_path)
+    called(program, "report", "run", "-o", "run.html", cwd=tmp_path)
     assert (tmp_path / "run.html").stat().st_size > 1e5
     assert "CASE" in called(program, "design", "--help")
     called(program, "check", next(p for p in cases if p.name == "outlines.yml"))  # which names a file beside it

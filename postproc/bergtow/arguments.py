@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Options that commands share, and kinds of numbers that options take."""
+import argparse
+import math
+from pathlib import Path
+
+from bergtow.errors import USAGE, BergtowError
+from bergtow.writing import may_write
+
+
+def _within(text, number, fits, words):
+    value = number(text)
+    if not fits(value):
+        raise argparse.ArgumentTypeError(f"{text} is {words}")
+    return value
+
+
+def finite(text):
+    return _within(text, float, math.isfinite, "not a finite number")
+
+
+def above_zero(text):
+    return _within(text, float, lambda x: 0 < x < math.inf, "not above zero")
+
+
+def not_below_zero(text):
+    return _within(finite(text), float, lambda x: x >= 0, "below zero")
+
+
+def at_least_one(text):
+    return _within(text, int, lambda x: x >= 1, "below 1")
+
+
+def share(text):
+    return _within(text, float, lambda x: 0 < x < 1, "not between 0 and 1")
+
+
+def whole_from(least, most):
+    """Type of a whole number of an option."""
+    def number(text):
+        if not (text.isdecimal() and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {most}")
+        return int(text)
+    return number
+
+
+def add_run(p, output):
+    """RUN, -o/--output (default: RUN/output) and --force."""
+    p.add_argument("run", metavar="RUN", help="output folder of a run")
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, help=f"file to write (default: RUN/{output})")
+    add_force(p)
+
+
+def add_force(p):
+    p.add_argument("--force", action="store_true", help="replace a file that is there, whoever made it")
+
+
+def output(a, default, allowed):
+    """Path to write to. Errors: BergtowError when its name does not end in one of the allowed suffixes, and when
+    another's file is there: before any work is done."""
+    path = a.output or Path(a.run) / default
+    ends_in(path, allowed)
+    may_write(path, a.force)
+    return path
+
+
+def ends_in(path, allowed):
+    """Errors: BergtowError."""
+    if path.suffix.lower() not in allowed:
+        raise BergtowError(f"{path}: unknown kind of file; end the name in {', '.join(allowed)}", USAGE)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""Messages and exit codes in place of tracebacks."""
+import argparse
+import os
+import signal
+import sys
+
+from bergtow.cli import lacking
+from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises what argparse prints and ends with."""
+
+    def error(self, message):
+        raise BergtowError(f"{message}; see {self.prog} --help", USAGE)
+
+
+class _Stream:
+    """A stream of text that may be lost, as to a reader that leaves (`| head`) or a full disk: what it is given goes
+    nowhere from then on, and the work goes on."""
+
+    def __init__(self, stream):
+        self._stream, self.lost = stream, False
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def _try(self, call, *arguments):
+        try:
+            call(*arguments)
+        except OSError:
+            self.lost = True
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())  # for what waits in buffers, and for programs that are started
+            os.close(nowhere)
+
+    def write(self, text):
+        self._try(self._stream.write, text)
+        return len(text)
+
+    def flush(self):
+        self._try(self._stream.flush)
+
+
+def guarded(name, main):
+    """Run main() and leave the program with the exit code of what happened. What asks it to stop does so as Ctrl-C, for
+    the runs that it has started to end with checkpoints; nohup holds. name: in front of messages."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+    for stream in (sys.stdout, sys.stderr):  # a terminal without a dash still gets its table
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    sys.stdout, sys.stderr = _Stream(sys.stdout), _Stream(sys.stderr)
+    code = 0
+    try:
+        main()
+    except BergtowError as error:
+        code = _say(name, error, error.status)
+    except ModuleNotFoundError as error:
+        code = _say(name, lacking.message(error), IO)
+    except OSError as error:
+        code = _say(name, error, IO)
+    except KeyboardInterrupt:
+        code = _say(name, "stopped", SIGNAL)
+    except SystemExit as end:
+        code = end.code
+    sys.stdout.flush()
+    if sys.stdout.lost and not code:
+        code = _say(name, "standard output: cannot be written; give it a place with space, or a reader that stays to "
+                    "the end; every file is written", IO)
+    if code:
+        sys.exit(code)
+
+
+def _say(name, message, code):
+    print("\n".join(f"{name}: {line}" for line in str(message).splitlines()), file=sys.stderr)
+    return code

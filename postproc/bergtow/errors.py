@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Exit codes and exceptions: one table, one tree, for the library, the functions and the commands."""
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Union
+
+#: exit codes of the commands, as those of the program (bergtow/base.h: bt_status): done; usage; a case or a map that
+#: is refused; a file that cannot be read or written, and members that are missing from a number; a run that failed;
+#: stopped by the user, a signal or a limit
+OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
+
+
+class BergtowError(Exception):
+    """What was asked for cannot be had; the text says why, and what to do. status: the exit code of a command that ends
+    with it."""
+
+    def __init__(self, text: str, status: int = USAGE) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+class CaseError(BergtowError, ValueError):
+    """A case that is refused; the text has one line for each error, with key and remedy."""
+
+
+class RunError(BergtowError):
+    """A folder or a file that cannot be used: "path: reason; remedy"."""
+
+    def __init__(self, path: Union[str, os.PathLike[str]], reason: str, remedy: str, status: int = IO) -> None:
+        super().__init__(f"{path}: {reason}; {remedy}", status)
+        self.path, self.reason, self.remedy = Path(path), reason, remedy
+
+
+class Refused(RunError):
+    """What the program refuses, in its words, one error a line, and with its exit code."""
+
+    def __init__(self, path: Union[str, os.PathLike[str]], said: str, status: int) -> None:
+        BergtowError.__init__(self, said, status)
+        self.path, self.reason, self.remedy = Path(path), said, ""

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: MIT
+"""The commands as functions: pictures, statistics, reports, outlines, and what is found out by runs.
+
+They are made within this process, by the very code of the commands, on Figures of matplotlib without pyplot: what a
+program has chosen for its own pictures (backend, fonts) is neither used nor touched. Whoever wants other axes draws
+them from open_result().
+"""
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union
+
+from .case import setting
+from .errors import IO, BergtowError
+
+if TYPE_CHECKING:
+    from .result.dataset import Result
+    from .study.ensemble import Ensemble
+
+#: a folder by its path, or what stands for it
+Of = Union[str, "os.PathLike[str]", "Result", "Ensemble"]
+
+
+def _folder(of: Of) -> str:
+    return os.fspath(of if isinstance(of, (str, os.PathLike)) else of.folder)
+
+
+#: options that a command takes several times, not once with several values
+_REPEATED = ("exclude", "also", "of")
+
+
+def _words(options: Mapping[str, Any]) -> list[str]:
+    """Options of a command: {"time_scale": 10, "linear": True, "times": [1, 2]} -> --time-scale=10 --linear ..., and
+    {"set": {"run.dt": "0.1 s"}} -> --set=run.dt=0.1 s"""
+    words = []
+    for name, value in options.items():
+        flag = "--" + name.rstrip("_").replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            words.append(flag)
+        elif isinstance(value, Mapping):
+            words += [f"{flag}={key}={setting(key, some)}" for key, some in value.items()]
+        elif name in _REPEATED or not isinstance(value, (list, tuple)):
+            words += [f"{flag}={v}" for v in (value if isinstance(value, (list, tuple)) else [value])]
+        else:
+            words += [flag, *map(str, value)]
+    return words
+
+
+def _perform(command: str, *words: str | os.PathLike[str]) -> None:
+    from . import cli  # which knows the functions here by their results
+    from .cli import lacking
+    try:
+        cli.perform(command, *words)
+    except ModuleNotFoundError as error:
+        raise BergtowError(lacking.message(error), IO) from None
+    except OSError as error:
+        raise BergtowError(str(error), IO) from None
+
+
+def _call(command: str, *words: str | os.PathLike[str]) -> str:
+    """What a command prints. Errors: BergtowError."""
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        _perform(command, *words)
+    return said.getvalue()
+
+
+class Picture:
+    """A picture: shown by a notebook, written by save()."""
+
+    def __init__(self, draw: Callable[[Path], Any]) -> None:
+        self._draw = draw
+        self._kept: dict[str, bytes] = {}
+
+    def _data(self, kind: str) -> bytes:
+        if kind not in self._kept:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / f"picture.{kind}"
+                self._draw(path)
+                self._kept[kind] = path.read_bytes()
+        return self._kept[kind]
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as shown; the
+        others are drawn from the folder as it is now."""
+        path = Path(file)
+        if path.exists() and not path.is_file():
+            raise BergtowError(f"{path}: is no regular file and is not replaced; give another name", IO)
+        kind = path.suffix.lstrip(".")
+        if kind in self._kept and path.parent.is_dir():
+            path.write_bytes(self._kept[kind])
+        else:
+            self._draw(path)
+        return path
+
+    def _repr_png_(self) -> bytes:
+        return self._data("png")
+
+
+def _picture(command: str, options: Mapping[str, Any], *arguments: str | os.PathLike[str]) -> Picture:
+    picture = Picture(lambda path: _call(command, *arguments, "-o", path, "--force", *_words(options)))
+    picture._repr_png_()  # what cannot be drawn is said now
+    return picture
+
+
+def plot_force(run: Of, **options: Any) -> Picture:
+    """The forces of a run against time. run: its folder or Result. options: those of bergtow plot-force, as max=100."""
+    return _picture("plot-force", options, _folder(run))
+
+
+def plot_field(run: Of, **options: Any) -> Picture:
+    """The ice before, during and after the tow. options: colour="speed", "force" or "thickness", times=[s, ...],
+    window="whole" or "body"."""
+    return _picture("plot-field", options, _folder(run))
+
+
+def plot_impacts(run: Of) -> Picture:
+    """Loads around the hull by panel, and how often the peak of a collision is exceeded."""
+    return _picture("plot-impacts", {}, _folder(run))
+
+
+def plot_resistance(runs: Of | list[Of] | tuple[Of, ...], **options: Any) -> Picture:
+    """Mean ice resistance of runs against the concentration, beside the estimates. options: linear=True."""
+    several = runs if isinstance(runs, (list, tuple)) else [runs]
+    return _picture("plot-resistance", options, *map(_folder, several))
+
+
+def plot_chains(run: Of, contacts: str | os.PathLike[str], **options: Any) -> Picture:
+    """The contact forces of one step. contacts: the file of --dump-contacts. options: whole=True."""
+    return _picture("plot-chains", options, _folder(run), contacts)
+
+
+def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
+    """The pictures that a study supports, {name: Picture}. ensemble: its folder or Ensemble. options: those of
+    bergtow plot-ensemble, as time_scale=10."""
+    def draw_all(kind: str) -> dict[str, bytes]:
+        with tempfile.TemporaryDirectory() as there:
+            _call("plot-ensemble", _folder(ensemble), "-o", there, "--format", kind, *_words(options))
+            return {p.stem: p.read_bytes() for p in sorted(Path(there).glob(f"*.{kind}"))}
+
+    drawn = {"png": draw_all("png")}
+
+    def of(name: str) -> Picture:
+        def draw(path: Path) -> None:
+            kind = path.suffix.lower().lstrip(".")
+            if kind not in drawn:
+                drawn[kind] = draw_all(kind)
+            path.write_bytes(drawn[kind][name])
+        return Picture(draw)
+
+    return {name: of(name) for name in drawn["png"]}
+
+
+def statistics(ensemble: Of, **options: Any) -> dict[str, Any]:
+    """The statistics of an ensemble, a dictionary as statistics.json has it: {"conditions": [...], ...}. options: those
+    of bergtow statistics, as time_scale=10, hours=[1, 10], exclude="jammed". Members that are missing are named in
+    "holes"."""
+    with tempfile.TemporaryDirectory() as there:
+        _call("statistics", _folder(ensemble), "-o", there, "--partial", *_words(options))
+        return json.loads((Path(there) / "statistics.json").read_text(encoding="utf-8"))
+
+
+def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool = False, **options: Any) -> Path:
+    """Write the report of a run or an ensemble, and return its path. of: a folder, Result or Ensemble. file: .html or
+    .pdf, report.html in the folder without. replace: a file there that is not a report of ours, too. options: those of
+    bergtow report, as client="...", size=20."""
+    path = Path(file) if file is not None else Path(_folder(of)) / "report.html"
+    _call("report", _folder(of), "-o", path, *(["--force"] if replace else []), *_words(options))
+    return path
+
+
+class Outlines:
+    """What `outlines` has made of a map: `file`, the GeoJSON for ice.outlines; `record`, every number as a dictionary
+    (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case."""
+
+    def __init__(self, map: Path, file: Path, record: dict[str, Any], text: str, options: list[str]) -> None:
+        self.map, self.file, self.record, self.text = map, file, record, text
+        self._options = options
+
+    def picture(self) -> Picture:
+        """The map beside the floes, with what was left out."""
+        def draw(path: Path) -> None:
+            with tempfile.TemporaryDirectory() as there:
+                _call("outlines", self.map, "-o", Path(there) / "x.geojson", "--picture", path, "--force",
+                      *self._options)
+        drawn = Picture(draw)
+        drawn._repr_png_()
+        return drawn
+
+    def __repr__(self) -> str:
+        return f"<bergtow.Outlines {self.file}>"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{html.escape(repr(self))}</p><pre>{html.escape(self.text)}</pre>"
+
+
+def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, replace: bool = False,
+             **options: Any) -> Outlines:
+    """Floe outlines for a case from a map: any vector format that GDAL knows (shapefile, GeoPackage, ...) or an image
+    of labels, in any coordinate reference system, repaired with every change counted.
+
+        floes = bergtow.outlines("mosaic.gpkg", "floes.geojson", centre=(-12, 80), box=("1.1 km", "900 m"))
+        case = bergtow.Case({"ice": {"outlines": "floes.geojson", ...}, ...})
+
+    file: GeoJSON to write. options: those of `bergtow outlines`, where pairs may be tuples: centre, heading, crs,
+    layer, where, thickness, water, unseen, footprint, band, pixel, box, clear, cut, stairs, tolerance, least. Needs
+    GDAL, pyproj and shapely.
+    Errors: BergtowError, with what to say of a map that is not understood.
+    """
+    known = {name: ",".join(str(v) for v in value) if isinstance(value, (list, tuple)) else value
+             for name, value in options.items()}
+    words = _words(known)
+    with tempfile.TemporaryDirectory() as there:
+        record = Path(there) / "record.json"
+        text = _call("outlines", map, "-o", file, "--record", record, *(["--force"] if replace else []), *words)
+        text = text.replace(f"{record}\n", "")
+        return Outlines(Path(map), Path(file), json.loads(record.read_text(encoding="utf-8")), text, words)
+
+
+def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[str],
+           options: Mapping[str, Any]) -> dict[str, Any]:
+    _perform(command, file, "-o", out, *_words(options))
+    return json.loads((Path(out) / f"{command}.json").read_text(encoding="utf-8"))
+
+
+def converge(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+    """What of the computation a result depends on, a dictionary as OUT/converge.json has it. options: those of
+    `bergtow converge`, as budget=10, vary="width,dt", set={"tow.speed": 0.5}."""
+    return _found("converge", case, out, options)
+
+
+def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+    """The uncertainty budget of a study, a dictionary as OUT/budget.json has it. options: those of `bergtow budget`."""
+    return _found("budget", study, out, options)
+
+
+def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+    """How fast a vessel tows in which ice, and what stops it, a dictionary as OUT/capability.json has it. options:
+    those of `bergtow capability`; from_ and to for its range."""
+    return _found("capability", case, out, options)
+
+
+def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> Path:
+    """From a case or a study to the report of the design tow force; returns the path of OUT/report.html. options: those
+    of `bergtow design`, as budget=14, no_pdf=True."""
+    _perform("design", case, "-o", out, *_words(options))
+    return Path(out) / "report.html"

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: MIT
+"""From a map of the ice to floe outlines that bergtow reads: any vector format that GDAL knows, or an image of labels.
+
+    bergtow outlines MAP -o FILE.geojson --centre LON,LAT        FILE.geojson, and what was done to the map a line each
+
+The outlines are put into a plane at the towed body (maps/plane.py), made sound floes, with every change counted
+(maps/repair.py), and written in degrees, or in metres where the map is of no place on the earth or a heading is asked
+for. ice.outlines of a case reads the file.
+"""
+import argparse
+import json
+import math
+from pathlib import Path
+
+from bergtow import _library, arguments, writing
+from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.maps import doubts as map_doubts
+from bergtow.maps import plane as map_plane
+from bergtow.maps import read as map_read
+from bergtow.maps import repair as map_repair
+from bergtow.maps import text as map_text
+
+import numpy as np
+
+PIXEL = 0.55            # tolerance, of a pixel: half of one, as steps along a straight shore have, would be a tie
+MARGIN = 1.0            # m, of the domain around all floes
+LEAST_SIZE = 0.01       # m, mean; below it metres are degrees
+EDGE = 64               # pieces of an edge of the image, which is bent in the plane
+
+
+def pair(text):
+    numbers = [float(part) for part in text.split(",")]
+    if len(numbers) != 2 or not all(map(math.isfinite, numbers)):
+        raise ValueError
+    return tuple(numbers)
+
+
+def place(text):
+    """LON,LAT"""
+    try:
+        return pair(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT") from None
+
+
+def metres(text):
+    """A number above zero, with m, km or nothing behind it."""
+    word = text.strip()
+    scale = 1e3 if word.endswith("km") else 1.0
+    try:
+        value = float(word.removesuffix("km").removesuffix("m")) * scale
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: is no length; write for example 500 m")
+    return value
+
+
+def extent(text):
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text}: is no extent; write for example 2km,800m")
+    return tuple(map(metres, parts))
+
+
+def square_metres(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: is no area in square metres")
+    return value
+
+
+def integers(text):
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: are no labels; write whole numbers, 0,3") from None
+
+
+def corners(text):
+    """X,Y,X,Y,..."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"{text}: are no corners; write at least three, column,row,column,row,...")
+    return tuple(zip(numbers[::2], numbers[1::2]))
+
+
+def angle(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not -360 <= value <= 360:
+        raise argparse.ArgumentTypeError(f"{text}: is no direction in degrees")
+    return value
+
+
+def options(p):
+    p.add_argument("map", metavar="MAP", type=Path)
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")
+    p.add_argument("--centre", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
+                   "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
+    p.add_argument("--heading", metavar="DEG", type=angle, help="direction of x, clockwise from north: metres for the "
+                   "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
+    p.add_argument("--crs", help="what the coordinates are where the file does not say it: EPSG:..., any other name "
+                   "that PROJ knows, or local: metres east and north of no place on the earth")
+    p.add_argument("--layer", metavar="NAME", help="which layer, of several; of a NetCDF or HDF5 file which grid")
+    p.add_argument("--where", metavar="SQL", help="only features for which this holds, e.g. \"kind = 'ice'\"")
+    p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
+                   "image the thickness by label: 1=0.5,2=1.2")
+    p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that are no ice "
+                   "(default 0); each connected region of another one is a floe")
+    p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is (default: unseen; to be "
+                   "named where --water has the same value)")
+    p.add_argument("--unseen", metavar="N,...", type=integers, default=(), help="labels of an image that say that "
+                   "nothing was seen there")
+    p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of what was imaged, as columns "
+                   "and rows of the image from its upper left; all around was not seen")
+    p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
+    p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
+    p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
+                   "about the centre, along x and y of the case")
+    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
+                   "circle about the centre: room for the towed body, which may be on the map itself")
+    p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: made straight "
+                   "within half a pixel, each floe keeping its area, or kept but for the tolerance")
+    p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
+                   "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
+    p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
+    p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
+    p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
+    arguments.add_force(p)
+
+def check_files(a):
+    """Before any work: names, and whether they may be written."""
+    arguments.ends_in(a.output, (".geojson", ".json"))
+    if a.record:
+        arguments.ends_in(a.record, (".json",))
+    if a.picture:
+        arguments.ends_in(a.picture, writing.PICTURES)
+    written = [f for f in (a.output, a.record, a.picture) if f]
+    if len({f.resolve() for f in [a.map, *written]}) <= len(written):
+        raise BergtowError("the map and the files to write need names of their own", USAGE)
+    for file in written:
+        writing.may_write(file, a.force)
+
+
+def in_plane(found, plane):
+    """Shapes in metres of the plane; and how far edges that are straight on the map bend there, m."""
+    bend = 0.0
+    for shape in found.shapes:
+        there = moved(shape.geometry, plane.onto)
+        if there.distance(map_repair.Point(0, 0)) < _library.limit("map_farthest_m"):  # others are not for this plane
+            bend = max(bend, bent(shape.geometry, plane))
+        shape.geometry = there
+        if shape.pixels is not None:
+            shape.pixels = moved(shape.pixels, plane.onto)
+    if found.seen is not None:
+        found.seen = moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
+    return bend
+
+
+def moved(geometry, onto):
+    """A polygon or several with all rings moved."""
+    Polygon, MultiPolygon = map_read.Polygon, map_read.MultiPolygon
+    parts = [Polygon(onto(np.asarray(p.exterior.coords)), [onto(np.asarray(r.coords)) for r in p.interiors])
+             for p in getattr(geometry, "geoms", [geometry])]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def divided(ring, n):
+    """A closed ring with n pieces to each edge."""
+    t = np.arange(n)[:, None, None] / n
+    between = ring[:-1] + t * np.diff(ring, axis=0)
+    return np.r_[between.swapaxes(0, 1).reshape(-1, 2), ring[:1]]
+
+
+def bent(geometry, plane):
+    worst = 0.0
+    for p in getattr(geometry, "geoms", [geometry]):
+        ring = np.asarray(p.exterior.coords)
+        if not isinstance(plane.crs, str) and plane.crs.is_geographic:  # an edge over the 180th meridian is a short one
+            ring = ring.copy()
+            ring[:, 0] = np.unwrap(ring[:, 0], period=360)
+        xy, between = plane.onto(ring), plane.onto((ring[:-1] + ring[1:]) / 2)
+        worst = max(worst, float(np.hypot(*(between - (xy[:-1] + xy[1:]) / 2).T).max()))
+    return worst
+
+
+def rules_of(a, found):
+    """Lengths of the repair: of an image they follow from its pixels."""
+    pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
+    along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
+    return map_repair.Rules(detail=a.tolerance or 0.0, tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
+                            least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
+                            keep_cut=a.cut == "keep", box=along, clear=a.clear)
+
+
+def summed_up(floes, found, rules):
+    """The numbers of the floes, over the box or the rectangle around them."""
+    bounds = np.array([f.polygon.bounds for f in floes])
+    reach = (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0))
+    half = [v / 2 for v in rules.box] if rules.box else None
+    x0, y0, x1, y1 = (-half[0], -half[1], *half) if half else reach
+    rectangle = map_read.Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    hull = found.seen is None  # of outlines nothing else says what was looked at
+    seen = rectangle.intersection(map_repair.hull_of_shapes(found.shapes) if hull else found.seen.buffer(0))
+    boxed = hull and rules.box  # the user says what was mapped
+    ground = rectangle if boxed else seen
+    if rules.clear:
+        ground = ground.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
+    if not ground.area > 0:
+        raise RunError(found.path, "has nothing of the box in its image", "set --centre, or --box")
+    refers_to = map_text.BOX if boxed else map_text.HULL if hull else map_text.IMAGED
+    return map_text.numbers(floes, (x0, x1, y0, y1), ground.area, refers_to,
+                            seen.area / rectangle.area) | {"reach_m": list(reach)}
+
+
+def geojson(floes, found, plane):
+    """The text. A file in degrees carries its centre where the reader looks for it."""
+    local = isinstance(plane.crs, str) or plane.heading is not None
+    mark = {"frame": "basin"} if plane.heading is not None else {} if local else {"origin": list(plane.centre)}
+    head = {"type": "FeatureCollection", "made_by": writing.MARK, "bergtow": mark}
+    if found.about:
+        head["description"] = found.about
+    if local:
+        head["crs"] = {"type": "name", "properties": {"name": map_read.local_crs()}}
+    lines = []
+    for k, floe in enumerate(floes):
+        ring = np.asarray(floe.polygon.exterior.coords)
+        ring = ring if floe.polygon.exterior.is_ccw else ring[::-1]
+        ring = ring if local else plane.degrees(ring)
+        ring[-1] = ring[0]
+        properties = {"source": floe.name}
+        if floe.thickness is not None:
+            properties["thickness"] = floe.thickness
+        if floe.cut:
+            properties["cut_by_edge"] = True
+        lines.append(json.dumps({"type": "Feature", "id": k, "properties": properties, "geometry": {
+            "type": "Polygon", "coordinates": [ring.tolist()]}}, allow_nan=False))
+    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+
+
+def perform(a):
+    check_files(a)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel, a.nodata, a.unseen, a.footprint,
+                           a.stairs)
+    found = map_read.read(a.map, how)
+    crs = map_plane.system(found.path, found.crs, a.crs, found.implied)
+    plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
+    map_read.mark_cut(found, degrees=not isinstance(crs, str) and crs.is_geographic)
+    book = map_repair.Ledger()
+    for why, names in found.skipped.items():
+        for name in names:
+            book.note(why, name)
+    bend = in_plane(found, plane)
+    rules = rules_of(a, found)
+    floes = map_repair.repaired(found.shapes, rules, book)
+    print("\n".join(map_text.map_lines(found, crs, a.crs)))
+    if not floes:
+        print("\n".join(map_text.change_lines(book)))
+        raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
+    distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
+    if distortion["farthest_m"] > _library.limit("map_farthest_m"):
+        far = distortion["farthest_m"] / 1e3
+        raise RunError(found.path, f"has floes {far:.4g} km from the centre; bergtow takes 100 km",
+                       "choose a part with --box or --where, or set --centre")
+    if numbers["mean_size_m"] < LEAST_SIZE:
+        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
+                       "metres",
+                       "say its crs: --crs EPSG:4326")
+    print("\n".join(map_text.plane_lines(plane, distortion, bend)))
+    print(f"tolerance: {map_text.length(rules.tolerance)}")
+    print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
+    writing.write_text(geojson(floes, found, plane), a.output, a.force)
+    doubts = map_doubts.doubts(found, floes, book)
+    for doubt in doubts:
+        print(f"warning: {doubt['text']}")
+    print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN,
+                                        None if isinstance(crs, str) else plane.centre[1])))
+    print(a.output)
+    if a.record:
+        record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers) | {"warnings": doubts}
+        writing.write_json(record, a.record, a.force)
+        print(a.record)
+    if a.picture:
+        from bergtow.maps import picture as map_picture
+        map_picture.draw(found, floes, rules, plane, a.picture, a.force)

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""From the coordinates of a map to metres in a plane that touches the earth at the towed body, and back to degrees.
+
+    plane = Plane.of(map, said, centre, heading)
+    plane.onto(xy)      metres (n, 2)            plane.degrees(xy)      longitude and latitude (n, 2)
+
+The plane is azimuthal equidistant about the centre, on WGS 84, by PROJ: distances and directions from the centre are
+true, and across the line of sight lengths are too great by (d/R)²/6 at the distance d, 4e-7 at 10 km. Rejected: UTM,
+whose metres are 0.9996 to 1.001 of those on the ground, turned by up to 3° and torn at the edges of zones; polar
+stereographic, 0.97 to 1.1; the stereographic projection about the centre, which keeps angles and has (d/R)²/4. It is
+the projection of src/geometry/outline.c, which was derived without PROJ, so a file in degrees comes to lie in the case
+where it lay here.
+
+With a heading H the first axis points along H and the second to the left of it, as in the basin's frame; without one
+they are east and north.
+
+What a file does not say of its coordinates is not guessed: no crs, one that names no place on the earth, or numbers
+that contradict it are refused, with what to say or to do.
+"""
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from bergtow.errors import RunError
+from bergtow.maps.read import INSTALL, local_crs
+
+WGS84 = "OGC:CRS84"   # degrees, longitude first
+SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
+      "east and north of no place on the earth"
+
+try:
+    import pyproj
+    from pyproj.aoi import AreaOfInterest
+    from pyproj.exceptions import CRSError
+    from pyproj.transformer import TransformerGroup
+    MISSING = None
+except ImportError as error:
+    MISSING = error
+
+
+def vertices(geometry):
+    """All vertices of a polygon or of several, (n, 2)."""
+    rings = [r for p in getattr(geometry, "geoms", [geometry]) for r in [p.exterior, *p.interiors]]
+    return np.concatenate([np.asarray(r.coords)[:, :2] for r in rings])
+
+
+# ---- which system
+
+
+def system(path, found, said, implied=False):
+    """The crs of a map: a pyproj.CRS, or local_crs(). found, said: of the file and of --crs, or None; implied: that of
+    the file says no more than its format, and gives way to --crs. Errors: RunError."""
+    if MISSING:
+        raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
+    ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
+    theirs = None if found is None else local_crs() if found == local_crs() else known(path, found, "its crs")
+    if theirs is None and ours is None:
+        raise RunError(path, "says no coordinate reference system", SAY)
+    if theirs is None or ours is None:
+        return theirs or ours
+    if implied:
+        return ours
+    local = isinstance(theirs, str), isinstance(ours, str)
+    if local[0] != local[1] or not local[0] and not same(theirs, ours):
+        raise RunError(path, f"is in {name_of(theirs)}, and --crs says {name_of(ours)}",
+                       "leave --crs out, or correct the file (ogr2ogr -a_srs, gdal_edit.py -a_srs)")
+    return theirs
+
+
+def known(path, text, whose):
+    """A pyproj.CRS of the plane or the ellipsoid, or None for one of a file that names no place on the earth."""
+    try:
+        crs = pyproj.CRS.from_user_input(text)
+    except CRSError:
+        raise RunError(path, f"{whose} is unknown to PROJ: {' '.join(text.split())[:80]}",
+                       "correct it; EPSG:4326, EPSG:32633 and the like are known") from None
+    while crs.is_compound or crs.is_bound:
+        crs = crs.sub_crs_list[0] if crs.is_compound else crs.source_crs
+    if crs.is_geographic or crs.is_projected:
+        return crs
+    if whose == "--crs":
+        raise RunError(path, f"--crs {text} is {crs.type_name}, neither degrees nor a projection", SAY)
+    return None
+
+
+def same(a, b):
+    return a.equals(b, ignore_axis_order=True)
+
+
+def name_of(crs):
+    if isinstance(crs, str):
+        return "local metres"
+    code = crs.to_authority()
+    return f"{':'.join(code)} ({crs.name})" if code else crs.name
+
+
+def hold_against(path, crs, xy, implied=False):
+    """Refuse coordinates that contradict their system. xy: of all shapes, (n, 2); implied: as in `system`."""
+    far, span = np.abs(xy).max(axis=0), np.ptp(xy, axis=0)
+    if isinstance(crs, str):
+        return
+    unit = crs.axis_info[0].unit_conversion_factor
+    if crs.is_geographic:
+        x, y = np.degrees(far * unit)
+        if x > 360.001 or y > 90.001:
+            swapped = x <= 90 and y <= 360
+            raise RunError(path, f"is in {name_of(crs)}, degrees, and has coordinates up to {far[0]:.6g}, {far[1]:.6g}",
+                           "latitude seems to come first: swap them" if swapped else
+                           "they look like metres: " + (SAY if implied else "correct its crs (ogr2ogr -a_srs)"))
+    elif (far * unit <= (180, 90)).all():
+        raise RunError(path, f"is in {name_of(crs)}, metres, and all its coordinates lie within {span[0]:.3g} of "
+                       f"{xy[0][0]:.6g}, {xy[0][1]:.6g}, as degrees do",
+                       "correct its crs (ogr2ogr -a_srs EPSG:4326)")
+
+
+# ---- the plane
+
+
+@dataclass
+class Plane:
+    """A plane at a place. Degrees in, metres out."""
+
+    crs: object             #: of the map: a pyproj.CRS, or local_crs() (to compare the two, PROJ would parse it)
+    centre: tuple           #: longitude, latitude, degrees; of local metres the place of 0, 0
+    heading: float = None   #: degrees from north to east, of the first axis
+    accuracy: float = 0.0   #: m, of the step to WGS 84; NaN: not known
+    _to: object = None      #: pyproj: map to degrees
+    _aeqd: object = None
+
+    @staticmethod
+    def of(found, crs, centre, heading):
+        """The plane of a map, about the centre or about the middle of what it holds. Errors: RunError."""
+        xy = np.concatenate([vertices(s.geometry) for s in found.shapes])
+        hold_against(found.path, crs, xy, found.implied)
+        plane = Plane(crs, centre, heading)
+        if isinstance(crs, str):
+            plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
+            return plane
+        if centre and not (abs(centre[0]) <= 360 and abs(centre[1]) <= 90):
+            raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is no place on the earth",
+                           "give longitude and latitude in degrees")
+        lonlat = plane._prepare(found, xy)
+        plane.centre = centre or middle(lonlat)
+        if not centre and -53 < plane.centre[1] < 30 and found.crs and crs.is_geographic:
+            raise RunError(found.path, "lies about latitude {1:.4g}, longitude {0:.4g}, where no sea ice is".format(
+                *plane.centre), "swap the coordinates if latitude comes first, or give the place with --centre")
+        plane._aeqd = about(plane.centre)
+        return plane
+
+    def _prepare(self, found, xy):
+        """Choose the way to WGS 84 that PROJ holds for the best where the map lies; longitude and latitude."""
+        first = pyproj.Transformer.from_crs(self.crs, WGS84, always_xy=True)
+        lonlat = np.array(first.transform(*xy.T)).T
+        if not np.isfinite(lonlat).all():
+            bad = xy[~np.isfinite(lonlat).all(axis=1)][0]
+            raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is no place in "
+                           f"{name_of(self.crs)}", "correct the crs of the file, or take the outline out")
+        lon, lat = middle(lonlat)
+        around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that a better grid could be fetched is said by the accuracy
+            ways = TransformerGroup(self.crs, WGS84, always_xy=True, area_of_interest=around).transformers
+        self._to = ways[0] if ways else first
+        known = "ballpark" not in self._to.description.lower() and self._to.accuracy >= 0
+        self.accuracy = self._to.accuracy if known else np.nan
+        return self.lonlat(xy)
+
+    def lonlat(self, xy):
+        """Degrees on WGS 84 of coordinates of the map. The 180th meridian has one longitude, so that what a map has cut
+        there has one edge, to the last bit, and is joined again."""
+        lon, lat = np.array(self._to.transform(*np.asarray(xy).T))
+        return np.c_[np.where(lon <= -180, lon + 360, lon), lat]
+
+    def onto(self, xy):
+        """Metres in the plane of coordinates of the map."""
+        if isinstance(self.crs, str):
+            return self.turned(np.asarray(xy) - self.centre)
+        return self.turned(np.array(self._aeqd(*self.lonlat(xy).T)).T)
+
+    def turned(self, en):
+        """East and north to the axes of the plane."""
+        if self.heading is None:
+            return en
+        s, c = np.sin(np.radians(self.heading)), np.cos(np.radians(self.heading))
+        return np.c_[en[:, 0] * s + en[:, 1] * c, -en[:, 0] * c + en[:, 1] * s]
+
+    def unturned(self, xy):
+        if self.heading is None:
+            return np.asarray(xy)
+        s, c = np.sin(np.radians(self.heading)), np.cos(np.radians(self.heading))
+        return np.c_[xy[:, 0] * s - xy[:, 1] * c, xy[:, 0] * c + xy[:, 1] * s]
+
+    def degrees(self, xy):
+        """Longitude and latitude of metres in the plane."""
+        lon, lat = self._aeqd(*self.unturned(np.asarray(xy)).T, inverse=True)
+        return np.c_[lon, lat]
+
+    def distortion(self, xy):
+        """What the plane and the map do to lengths, areas and north at places of the plane, as PROJ computes them:
+        the farthest place, m; the greatest relative errors of a length and of an area; the greatest angle between the
+        plane's north and the true one, degrees; least and greatest scale of the map, or None where it has degrees."""
+        xy = np.asarray(xy)
+        out = {"farthest_m": float(np.hypot(*xy.T).max())}
+        if isinstance(self.crs, str):
+            return out
+        lonlat = self.degrees(xy)
+        f = self._aeqd.get_factors(*lonlat.T)
+        out |= {"length_error": float(np.abs(np.r_[f.tissot_semimajor, f.tissot_semiminor] - 1).max()),
+                "area_error": float(np.abs(f.areal_scale - 1).max()),
+                "north_turns_deg": float(np.abs(f.meridian_convergence).max()), "map_scale": None}
+        if self.crs.is_projected:
+            there = lonlat if same(self.crs.geodetic_crs, pyproj.CRS(WGS84)) else np.array(
+                pyproj.Transformer.from_crs(WGS84, self.crs.geodetic_crs, always_xy=True).transform(*lonlat.T)).T
+            f = pyproj.Proj(self.crs).get_factors(*there.T)
+            out["map_scale"] = [float(f.tissot_semiminor.min()), float(f.tissot_semimajor.max())]
+        return out
+
+
+def about(centre):
+    return pyproj.Proj(proj="aeqd", lon_0=centre[0], lat_0=centre[1], datum="WGS84", units="m")
+
+
+def middle(lonlat):
+    """The place in the middle of others: of the box around them in the plane at their mean direction, which no pole and
+    no meridian disturbs."""
+    lon, lat = np.radians(lonlat).T
+    x, y, z = (np.cos(lat) * np.cos(lon)).mean(), (np.cos(lat) * np.sin(lon)).mean(), np.sin(lat).mean()
+    plane = about((np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))))
+    e, n = plane(*np.asarray(lonlat).T)
+    e, n = np.asarray(e), np.asarray(n)
+    if not (np.isfinite(e).all() and np.isfinite(n).all()):
+        return tuple(map(float, plane(0, 0, inverse=True)))
+    return tuple(map(float, plane((e.min() + e.max()) / 2, (n.min() + n.max()) / 2, inverse=True)))

@@ -1,0 +1,526 @@
+# SPDX-License-Identifier: MIT
+"""Maps of ice as GIS programs have them: outlines in any vector format that GDAL knows, or an image of labels.
+
+    read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, what was imaged
+
+A label image is cut into connected regions of one value; each is a shape. (Regions that meet at a corner only are two.)
+Along pixels an outline would be a staircase, whose corners are no bays: maps/stairs.py makes it straight, that of an
+image and that of outlines which were traced along pixels. Where this leaves nothing (of a crumb) or is not wanted, each
+unit step of an image gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and
+since a closed ring has four more of the one than of the other, its area changes by half a pixel in all.
+
+Libraries: osgeo alone, since GDAL reads outlines and images by the same call and both Debians have it. Rejected:
+fiona and rasterio, two packages over the same library for what is used of it here.
+"""
+import json
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bergtow import _library
+from bergtow.errors import RunError
+from bergtow.maps import stairs as map_stairs
+
+INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
+MOST_PIXELS = 400_000_000
+IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # what GeoJSON is in where nobody says it [RFC 7946]
+#: of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
+CHART = {"POLY_TYPE", "PGON_TYPE", "CT", "E_CT", "N_CT", "SA", "E_SA", "FA", "E_FA", "ICECODE", "NIS_CLASS", "A_LEGEND"}
+LISTED = 20  # grids of a file that are named
+TELLS_ITSELF = ("TIFFTAG_IMAGEDESCRIPTION", "DESCRIPTION", "Description", "Comment")
+
+try:
+    from osgeo import gdal, ogr
+    from shapely import wkb
+    from shapely.geometry import MultiPolygon, Polygon
+    from shapely.ops import unary_union
+    from shapely.prepared import prep
+    MISSING = None
+except ImportError as error:
+    MISSING = error
+
+
+def local_crs():
+    """The name of metres east and north of no place on the earth."""
+    return _library.limit("map_local_crs")
+
+
+@dataclass
+class Reading:
+    """How a file is to be read, where it leaves a choice."""
+
+    layer: str = None
+    where: str = None
+    thickness: str = None   #: name of a column; of an image, "VALUE=M,..."
+    water: tuple = (0,)     #: values of an image that are no ice
+    band: int = None
+    pixel: float = None     #: m, of an image that says nothing of its place
+    nodata: str = None      #: "water" or "unseen": what an image's nodata is where --water has its value, too
+    unseen: tuple = ()      #: values of an image that say that nothing was seen there
+    footprint: tuple = None #: corners of what was imaged, columns and rows of an image
+    stairs: str = "undo"    #: or "keep"
+
+
+@dataclass
+class Shape:
+    """One outline, or several of one feature, as the file has them."""
+
+    name: str
+    geometry: object            #: Polygon, MultiPolygon or None
+    thickness: float = None     #: m
+    cut: bool = False           #: by the edge of the image
+    pixels: object = None       #: Polygon along the edges of its pixels, whose area an image has
+    straight: bool = False      #: its staircase was made straight
+
+
+@dataclass
+class Map:
+    """What a file holds."""
+
+    path: Path
+    crs: str                    #: WKT or a name, local_crs(), or None where the file says nothing
+    shapes: list
+    implied: bool = False       #: the crs is the one that the format has where nobody says any
+    seen: object = None         #: what was imaged, in the coordinates of the file; None: not known
+    pixels: int = 0             #: in `seen`
+    about: str = ""             #: what the file says of itself
+    near: list = field(default_factory=list)     #: columns not read whose names are nearly that of the thickness
+    skipped: dict = field(default_factory=dict)  #: {why: [names]}
+    chart: list = field(default_factory=list)    #: columns that an ice chart has, and floes have not
+
+
+def need_libraries():
+    """Errors: RunError where GDAL or shapely is not installed."""
+    if MISSING:
+        raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
+
+
+def read(path, how):
+    """The map. Errors: RunError."""
+    need_libraries()
+    gdal.UseExceptions()
+    ogr.UseExceptions()
+    if not path.exists():
+        raise RunError(path, "no such file", "name a file of outlines or of labels; of several grids or layers in it "
+                       "--layer chooses one")
+    if path.suffix.lower() == ".npy":
+        return from_array(path, how)
+    try:
+        source = quietly(gdal.OpenEx, str(path), gdal.OF_VECTOR | gdal.OF_RASTER)
+    except RuntimeError as error:
+        raise RunError(path, f"is no map that GDAL can read ({first_line(error)})",
+                       "name outlines (GeoJSON, shapefile, GeoPackage, ...) or an image of labels") from None
+    if source.GetLayerCount():
+        return from_layer(path, source, how)
+    source, name = grid_of(path, source, how)
+    return from_image(path, source, how, name)
+
+
+def quietly(call, *words, **named):
+    """A call of GDAL without the warnings that it prints; its errors are raised as ever."""
+    gdal.PushErrorHandler("CPLQuietErrorHandler")
+    try:
+        return call(*words, **named)
+    finally:
+        gdal.PopErrorHandler()
+
+
+def first_line(error):
+    return (str(error).splitlines() or ["no reason given"])[0]
+
+
+def refuse_unused(path, how, names, kind):
+    for name in names:
+        if getattr(how, name) != getattr(Reading(), name):
+            raise RunError(path, f"holds {kind}, for which there is no --{name}", f"leave --{name} out")
+
+
+# ---- outlines
+
+
+def from_layer(path, source, how):
+    refuse_unused(path, how, ("water", "band", "pixel", "nodata", "unseen", "footprint"), "outlines")
+    names = [source.GetLayer(k).GetName() for k in range(source.GetLayerCount())]
+    if how.layer is None and len(names) > 1 or how.layer is not None and how.layer not in names:
+        raise RunError(path, f"holds the layers {', '.join(names)}", "choose one of them with --layer")
+    layer = source.GetLayerByName(how.layer or names[0])
+    columns = [layer.GetLayerDefn().GetFieldDefn(k).GetName() for k in range(layer.GetLayerDefn().GetFieldCount())]
+    if how.thickness and how.thickness not in columns:
+        raise RunError(path, f"has no column {how.thickness}",
+                       f"name one of {', '.join(columns) or 'those of another layer'}")
+    crs, implied = crs_of_layer(path, source, layer)
+    found = Map(path, crs, [], implied, about=about_of(path, source, layer),
+                chart=[name for name in columns if name.upper() in CHART])
+    try:
+        if how.where:
+            layer.SetAttributeFilter(how.where)
+        column = how.thickness or thickness_column(layer, columns)
+        if not column:
+            found.near = [name for name in columns if "thick" in name.lower()
+                          or name.lower() in _library.limit("map_words_near_thickness")]
+        for feature in layer:
+            add_feature(found, feature, column)
+    except RuntimeError as error:
+        raise RunError(path, f"cannot be read ({first_line(error)})",
+                       "mend --where, or the file (ogrinfo tells more)") from None
+    if how.stairs == "undo":
+        retrace(found.shapes)
+    if not found.shapes:
+        others = sum(len(names) for names in found.skipped.values())
+        raise RunError(path, f"holds no polygons ({others} features of other kinds)" if others else
+                       "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
+    return found
+
+
+def retrace(shapes):
+    """Make the staircases of outlines straight that were traced along the pixels of an image."""
+    polygons = [s.geometry for s in shapes if s.geometry.geom_type == "Polygon"]
+    pixel = map_stairs.lattice(polygons) if polygons else None
+    for shape in shapes if pixel is not None else []:
+        new = map_stairs.retraced(shape.geometry, pixel) if shape.geometry.geom_type == "Polygon" else None
+        new = new and Polygon(new.exterior, shape.geometry.interiors)
+        if new and new.is_valid:
+            shape.pixels, shape.straight = Polygon(shape.geometry.exterior), True
+            shape.geometry = new
+
+
+def thickness_column(layer, columns):
+    """The column of the thickness where none is named, or None. Under another spelling it may hold anything: remarks,
+    texts with units, 0 for what nobody measured."""
+    def sound(name):
+        values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
+        return all(positive(value) is not None for value in values)
+    if "thickness" in columns:
+        return "thickness"
+    return next((name for name in columns if name.lower() == "thickness" and sound(name)), None)
+
+
+def add_feature(found, feature, column):
+    name, geometry = f"feature {feature.GetFID()}", feature.GetGeometryRef()
+    thickness = None
+    if column and feature.IsFieldSetAndNotNull(column):
+        thickness = positive(feature.GetField(column))
+        if thickness is None:
+            raise RunError(found.path, f"{name}: {column} = {feature.GetField(column)} is no thickness in metres",
+                           "correct it, or leave the column empty")
+    if geometry is None or geometry.IsEmpty():
+        found.skipped.setdefault("empty", []).append(name)
+        return
+    geometry = geometry.GetLinearGeometry()
+    geometry.FlattenTo2D()
+    geometry.CloseRings()
+    polygons, others = polygons_of(geometry)
+    for ring in (r for p in polygons for r in [p.exterior, *p.interiors]):
+        if not np.isfinite(np.asarray(ring.coords)).all():
+            raise RunError(found.path, f"{name} has a vertex that is no finite number", "correct it or take it out")
+    if others:
+        found.skipped.setdefault(others, []).append(name)
+    if polygons:
+        whole = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
+        found.shapes.append(Shape(name, whole, thickness))
+
+
+def polygons_of(geometry):
+    """([Polygon], why something of an OGR geometry is left out or None)."""
+    kind = geometry.GetGeometryName()
+    if kind == "POLYGON":
+        try:
+            return [wkb.loads(bytes(geometry.ExportToWkb()))], None
+        except Exception:  # GEOS has no class of its own for a ring of two points
+            return [], "fewer than 3 vertices"
+    parts = [polygons_of(geometry.GetGeometryRef(k)) for k in range(geometry.GetGeometryCount())]
+    if kind in ("POINT", "LINESTRING") or not parts:
+        return [], "no polygon"
+    return [p for some, _ in parts for p in some], next((why for _, why in parts if why), None)
+
+
+def positive(value):
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return None
+    return number if 0 < number < np.inf else None
+
+
+def crs_of_layer(path, source, layer):
+    """(crs or None, is it only implied). Without a crs GeoJSON is in degrees; programs that do not know their system
+    write the name of these, and GDAL takes any name that it does not know for them: so there the file is asked. An
+    undefined system, as a GeoPackage has it, is none."""
+    driver = source.GetDriver().ShortName
+    crs = head_of(path).get("crs") if driver == "GeoJSON" else None
+    if crs is not None:
+        name = f"{crs.get('properties', {}).get('name') if isinstance(crs, dict) else None}"
+        return name, name.upper().replace("::", ":").endswith(IMPLIED)  # for PROJ to judge, but for local_crs()
+    reference = layer.GetSpatialRef()
+    if reference is None or (reference.GetName() or "").lower().startswith("undefined"):
+        return None, False
+    return reference.ExportToWkt(), driver.startswith("GeoJSON")
+
+
+def head_of(path):
+    """The members of a GeoJSON text."""
+    try:
+        text = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError):
+        return {}
+    return text if isinstance(text, dict) else {}
+
+
+def about_of(path, source, layer=None):
+    texts = [source.GetMetadataItem(key) for key in TELLS_ITSELF]
+    if layer:
+        texts += [layer.GetMetadataItem(key) for key in TELLS_ITSELF]
+        if source.GetDriver().ShortName == "GeoJSON":
+            texts.append(head_of(path).get("description"))
+    return next((" ".join(str(text).split()) for text in texts if text), "")
+
+
+def mark_cut(found, degrees):
+    """Outlines have no image; where the edges of several lie on one side of the box of all, it was one's edge. But the
+    180th meridian, at which files in degrees part floes (RFC 7946), ends no map."""
+    if found.seen is not None:
+        return
+    drawn = [s.pixels or s.geometry for s in found.shapes]
+    bounds = np.array([g.bounds for g in drawn])
+    sides = np.r_[bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)]
+    near = 1e-9 * max(sides[2] - sides[0], sides[3] - sides[1])
+    for k in range(4):
+        if degrees and k % 2 == 0 and abs(abs(sides[k]) - 180) <= near:
+            continue
+        lying = [s for s, g, b in zip(found.shapes, drawn, bounds)
+                 if abs(b[k] - sides[k]) <= near and lies_on(g, k % 2, sides[k], near)]
+        for shape in lying if len(lying) > 1 else []:
+            shape.cut = True
+
+
+def lies_on(geometry, axis, value, near):
+    """Has a shape an edge, not only a vertex, where one coordinate has this value?"""
+    for part in getattr(geometry, "geoms", [geometry]):
+        on = np.abs(np.asarray(part.exterior.coords)[:, axis] - value) <= near
+        if np.any(on[1:] & on[:-1]):
+            return True
+    return False
+
+
+# ---- label images
+
+
+def grid_of(path, source, how):
+    """(the data set to read, its name or None): of the grids in a file of NetCDF or HDF5 the one that is named."""
+    grids = {re.sub(r'^.*":/*|^[^:]*:[^:]*:/*', "", full): (full, text) for full, text in source.GetSubDatasets()}
+    if not grids:
+        refuse_unused(path, how, ("layer",), "an image")
+    elif how.layer in grids:
+        source = gdal.Open(grids[how.layer][0])
+    elif how.layer or not source.RasterCount:
+        names = [f"{name} {text.split(']')[0]}]" for name, (_, text) in grids.items()]
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        raise RunError(path, f"holds the grids {', '.join(names[:LISTED])}{more}",
+                       "choose one of them with --layer, for example --layer " + next(iter(grids)))
+    return source, how.layer if grids else None
+
+
+def as_stored(source):
+    """The same grid, with its rows as they are in the file. Of one without a place GDAL's netCDF driver takes the first
+    row for the southernmost, even where the file has rows from the north."""
+    before = gdal.GetConfigOption("GDAL_NETCDF_BOTTOMUP")
+    gdal.SetConfigOption("GDAL_NETCDF_BOTTOMUP", "NO")
+    try:
+        return gdal.Open(source.GetDescription())
+    finally:
+        gdal.SetConfigOption("GDAL_NETCDF_BOTTOMUP", before)
+
+
+def place_of(path, source, name):
+    """GDAL's six numbers, or None where the file does not say them; also from the coordinate variables of a grid of
+    NetCDF or HDF5 that GDAL does not take for one, whose axes have no units."""
+    place = source.GetGeoTransform(can_return_null=True)
+    if place is not None or source.GetDriver().ShortName not in ("netCDF", "HDF5", "HDF5Image"):
+        return place
+    try:
+        root = gdal.OpenEx(str(path), gdal.OF_MULTIDIM_RASTER).GetRootGroup()
+        full = name or next(n for n in root.GetMDArrayNames() if root.OpenMDArray(n).GetDimensionCount() >= 2)
+        rows, columns = root.OpenMDArrayFromFullname("/" + full).GetDimensions()[-2:]
+        axes = [d.GetIndexingVariable().ReadAsArray().astype(float) for d in (columns, rows)]
+    except (RuntimeError, AttributeError, StopIteration, TypeError, ValueError):
+        return None
+    steps = [(axis[-1] - axis[0]) / max(len(axis) - 1, 1) for axis in axes]
+    for axis, step in zip(axes, steps):
+        if not step or np.abs(np.diff(axis) / step - 1).max(initial=0) > 1e-3:
+            return None
+    return axes[0][0] - steps[0] / 2, steps[0], 0, axes[1][0] - steps[1] / 2, 0, steps[1]
+
+
+def inside(footprint, shape):
+    """Which pixels have their middle in the polygon of columns and rows."""
+    image = gdal.GetDriverByName("MEM").Create("", shape[1], shape[0], 1, gdal.GDT_Byte)
+    memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
+    layer = memory.CreateLayer("footprint")
+    feature = ogr.Feature(layer.GetLayerDefn())
+    feature.SetGeometry(ogr.CreateGeometryFromWkb(wkb.dumps(Polygon(footprint))))
+    layer.CreateFeature(feature)
+    quietly(gdal.RasterizeLayer, image, [1], layer, burn_values=[1])
+    return image.ReadAsArray() != 0
+
+
+def from_array(path, how):
+    refuse_unused(path, how, ("layer", "where", "band", "nodata"), "an image of numpy")
+    try:
+        labels = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise RunError(path, f"is no array of numpy ({first_line(error)})", "write it with numpy.save") from None
+    if labels.ndim != 2 or labels.dtype.kind not in "biuf" or not labels.size:
+        raise RunError(path, f"has the shape {labels.shape} and the type {labels.dtype}",
+                       "save one label a pixel: rows, from the north, by columns")
+    return of_labels(Map(path, None, []), labels, finite(labels), np.isin(labels, how.water), None, how)
+
+
+def finite(labels):
+    return np.isfinite(labels) if labels.dtype.kind == "f" else np.ones(labels.shape, bool)
+
+
+def from_image(path, source, how, name=None):
+    refuse_unused(path, how, ("where",), "an image")
+    place = place_of(path, source, name)
+    if source.GetDriver().ShortName == "netCDF" and source.GetGeoTransform(can_return_null=True) is None:
+        source = as_stored(source)
+    bands = source.RasterCount
+    if how.band is None and bands != 1 or not 1 <= (how.band or 1) <= bands:
+        raise RunError(path, f"has {bands} bands, as pictures do; labels are one number a pixel",
+                       "choose it with --band, or classify the image first")
+    if source.RasterXSize * source.RasterYSize > MOST_PIXELS:
+        raise RunError(path, f"has more than {MOST_PIXELS} pixels", "cut it, or make it coarser (gdal_translate)")
+    band = source.GetRasterBand(how.band or 1)
+    try:
+        labels, nodata = band.ReadAsArray(), band.GetNoDataValue()
+    except RuntimeError as error:
+        raise RunError(path, f"cannot be read ({first_line(error)})", "get it anew") from None
+    if nodata is None and how.nodata is not None:
+        raise RunError(path, "has no nodata value", "leave --nodata out")
+    if nodata is not None and nodata in how.water and nodata not in how.unseen and how.nodata is None:
+        raise RunError(path, f"has {nodata:g} both for nodata and for water (--water)",
+                       "say which it is: --nodata water, or --nodata unseen")
+    empty = np.zeros(labels.shape, bool)
+    if nodata is not None:
+        empty = np.isnan(labels) if np.isnan(nodata) else labels == nodata
+    valid = finite(labels) | empty if how.nodata == "water" else finite(labels) & ~empty
+    flags = band.GetMaskFlags()
+    if not flags & (gdal.GMF_ALL_VALID | gdal.GMF_NODATA):
+        valid &= band.GetMaskBand().ReadAsArray() != 0
+    if source.GetGCPCount() and place is None:
+        raise RunError(path, "is placed by control points", "warp it first: gdalwarp -r near")
+    reference = source.GetSpatialRef()
+    found = Map(path, reference.ExportToWkt() if reference else None, [], about=about_of(path, source))
+    water = empty | np.isin(labels, how.water)
+    return of_labels(found, labels, valid, water, place, how)
+
+
+def of_labels(found, labels, valid, water, place, how):
+    """The map of an image. valid: what was seen; water: what is no ice, and need be no label, such as a nodata of NaN.
+    place: GDAL's six numbers from column and row to coordinates, or None."""
+    if how.unseen:
+        valid = valid & ~np.isin(labels, how.unseen)
+    if how.footprint:
+        valid = valid & inside(how.footprint, labels.shape)
+    if not valid.any():
+        raise RunError(found.path, "has no pixel that was seen", "see --unseen, --footprint, and the image's nodata")
+    ice = valid & ~water
+    some = labels[ice]
+    if labels.dtype.kind == "f" and np.any(some != np.rint(some)):
+        raise RunError(found.path, "has values that are no labels (whole numbers)", "classify the image first")
+    if some.size and some.min() < 0:
+        raise RunError(found.path, f"has the label {some.min():.0f}, which programs that group pixels give to those of "
+                       "no floe", f"say which labels are no ice: --water {some.min():.0f}, or with 0 among them: "
+                       f"--water 0,{some.min():.0f}")
+    if place is None and how.pixel is None:
+        raise RunError(found.path, "says nothing of its place and scale (no geotransform, no world file)",
+                       "give the size of a pixel in metres with --pixel, or a world file beside it")
+    if place is not None and how.pixel is not None:
+        raise RunError(found.path, "has a scale of its own", "leave --pixel out")
+    if place is None:
+        rows, columns = labels.shape
+        place = (-how.pixel * columns / 2, how.pixel, 0, how.pixel * rows / 2, 0, -how.pixel)
+        found.crs = local_crs()
+    thick = thickness_by_value(found.path, how.thickness)
+    values, label_of = numbered(labels, ice)
+    edge = unary_union([p for p, _ in regions(valid.astype(np.int32), valid)])
+    touches = prep(edge.boundary).intersects
+    for polygon, number in regions(values, ice):
+        value = label_of(number)
+        name = f"label {value} at column {polygon.exterior.coords[0][0]:.0f}, row {polygon.exterior.coords[0][1]:.0f}"
+        shore, is_straight = shore_of(polygon, how)
+        found.shapes.append(Shape(name, placed(shore, place), thick.get(value), touches(polygon),
+                                  placed(Polygon(polygon.exterior), place), is_straight))
+    if not found.shapes:
+        raise RunError(found.path, "holds no label of ice", f"say which values are water: --water (now {how.water})")
+    found.seen, found.pixels = placed(edge, place), int(valid.sum())
+    return found
+
+
+def numbered(labels, ice):
+    """(labels that 32 bits hold, what gives back the label of one): GDAL polygonizes no larger ones."""
+    if labels[ice].max(initial=0) < 2 ** 31:
+        return np.where(ice, labels, 0).astype(np.int32), int
+    kept, places = np.unique(labels[ice], return_inverse=True)
+    values = np.zeros(labels.shape, np.int32)
+    values[ice] = places
+    return values, lambda number: int(kept[number])
+
+
+def thickness_by_value(path, text):
+    pairs = [pair.split("=") for pair in (text or "").split(",") if pair]
+    try:
+        out = {int(value): positive(metres) for value, metres in pairs}
+    except ValueError:
+        out = {0: None}
+    if None in out.values():
+        raise RunError(path, f"--thickness {text} is no list VALUE=M,...", "write for example 1=0.5,2=1.2")
+    return out
+
+
+def regions(values, mask):
+    """[(Polygon in columns and rows, value)] of connected pixels of one value."""
+    rows, columns = values.shape
+    image = gdal.GetDriverByName("MEM").Create("", columns, rows, 2, gdal.GDT_Int32)
+    image.GetRasterBand(1).WriteArray(values)
+    image.GetRasterBand(2).WriteArray(mask.astype(np.int32))
+    memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
+    layer = memory.CreateLayer("regions")
+    layer.CreateField(ogr.FieldDefn("value", ogr.OFTInteger))
+    gdal.Polygonize(image.GetRasterBand(1), image.GetRasterBand(2), layer, 0)
+    return [(wkb.loads(bytes(f.GetGeometryRef().ExportToWkb())), f.GetField(0)) for f in layer]
+
+
+def shore_of(polygon, how):
+    """(a region of pixels with its shore, was its staircase made straight)."""
+    middles = bevelled(polygon)
+    straight = map_stairs.straight(polygon) if how.stairs == "undo" else None
+    if straight is not None and polygon.interiors:
+        straight = Polygon(straight.exterior, middles.interiors)
+        straight = straight if straight.is_valid else None
+    return (middles, False) if straight is None else (straight, True)
+
+
+def bevelled(polygon):
+    """The polygon through the middles of the unit steps of its rings."""
+    def ring(points):
+        p = np.asarray(points)
+        steps = np.abs(np.diff(p, axis=0)).sum(axis=1).astype(int)
+        start, way = np.repeat(p[:-1], steps, axis=0), np.repeat(np.sign(np.diff(p, axis=0)), steps, axis=0)
+        within = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+        return start + way * (within[:, None] + 0.5)
+    return Polygon(ring(polygon.exterior.coords), [ring(r.coords) for r in polygon.interiors])
+
+
+def placed(geometry, place):
+    """From columns and rows to the coordinates of the map."""
+    x0, a, b, y0, c, d = place
+
+    def ring(points):
+        p = np.asarray(points)
+        return np.c_[x0 + a * p[:, 0] + b * p[:, 1], y0 + c * p[:, 0] + d * p[:, 1]]
+    parts = [Polygon(ring(p.exterior.coords), [ring(r.coords) for r in p.interiors])
+             for p in getattr(geometry, "geoms", [geometry])]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)

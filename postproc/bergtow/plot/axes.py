@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""What pictures of an ensemble share: the numbers that were varied, labels, headline."""
+from bergtow.plot import style
+from bergtow.result.members import reading, short_key
+
+import numpy as np
+
+
+def numeric(e):
+    """Keys of numbers that were varied among the members that are used."""
+    return [k for k, v in e.parameters.items() if v.dtype != object and len(set(v[e.used].tolist())) > 1]
+
+
+def axis_label(e, key):
+    unit = reading(key, e.units[key])[1]
+    return short_key(key) + (f" ({unit})" if unit else "")
+
+
+def headline(figure, e, subject):
+    doubtful = sum(bool(e.doubts(m)) for m in e.used)
+    words = [f"{len(e.used)} members"]
+    if doubtful:
+        words.append(f"{doubtful} with warnings")
+    missing = e.n - len(e.used)
+    if missing:
+        words.append(f"{missing} failed, waiting or left out")
+    if without := e.without_bound(np.arange(e.n)):
+        some = {e.condition[e.name.index(name)] for name in [*without.some, *without.ended]}
+        words.append(f"at least these in {len(some)} of {len(np.unique(e.condition))} conditions: no load in "
+                     f"{100 * without.share:.2g} % of the steps, {len(without.ended)} tows ended for it")
+    style.head(figure, f"{style.plain(e.title)}: {subject}", ", ".join(words))
+
+
+def of(e, rows):
+    return e.mean[rows]
+
+
+def wants_log(values):
+    """True where values are positive and span more than a decade and a half."""
+    values = np.asarray(values, dtype=float)
+    values = values[np.isfinite(values)]
+    return bool(len(values) and values.min() > 0 and values.max() > 30 * values.min())

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""Force chains: the contact forces of one step as lines through the ice, as wide as they are strong.
+
+The contacts come from `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`. A line goes from the centroid of one floe
+over the contact point to that of the other, or ends at the contact point on a large body or a wall. Force = normal
+impulse / time step, the points of one pair of floes together.
+"""
+from dataclasses import dataclass
+from pathlib import Path
+
+from bergtow import arguments, writing
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result.run import Run, place
+
+import h5py
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LogNorm
+
+WIDEST = 5.0   # points
+DECADES = 2.5  # below the largest force, over which lines are drawn
+
+
+@dataclass
+class Contacts:
+    """Contacts of one step."""
+
+    time: float          #: s
+    body: np.ndarray     #: [n, 2] ids
+    normal: np.ndarray   #: [n, 2]
+    lever: np.ndarray    #: [n, 2, 2] m, from each body's centroid to the contact point
+    force: np.ndarray    #: [n] N, normal
+    pose: np.ndarray     #: [N, 3]
+
+
+def read(path):
+    """The Contacts of a dumped step. Errors: RunError."""
+    try:
+        with h5py.File(path, "r") as f:
+            if "places" not in f or "solution" not in f:
+                raise RunError(path, "does not say where its contacts are",
+                               "write it with --dump-contacts of this version")
+            places = f["places"]
+            dt = float(places.attrs["dt"])
+            impulse, normal = f["solution/r"][()].reshape(-1, 2), places["normal"][()]
+            # Floes that lie over each other have a contact of their own, which has no normal.
+            drawn = np.isnan(f["disc"][()]) if "disc" in f else np.ones(len(impulse), bool)
+            return Contacts(float(places.attrs["time"]), places["body"][()][drawn], normal[drawn],
+                            places["lever"][()].reshape(-1, 2, 2)[drawn], impulse[drawn, 0] / dt, places["pose"][()])
+    except FileNotFoundError:
+        raise RunError(path, "no such file",
+                       "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None
+    except (OSError, KeyError, ValueError) as error:
+        raise RunError(path, f"is no dumped contact problem ({str(error).splitlines()[0]})",
+                       "write it with --dump-contacts") from None
+
+
+def pairs(c):
+    """Contacts of one pair of bodies taken together: (body [m, 2], lever [m, 2, 2] at the pressure centre, force [m]);
+    those without force are left out."""
+    some = c.force > 0
+    body, lever, force = c.body[some], c.lever[some], c.force[some]
+    unique, which = np.unique(body, axis=0, return_inverse=True)
+    which = which.ravel()
+    total = np.bincount(which, force, len(unique))
+    centre = np.zeros((len(unique), 2, 2))
+    np.add.at(centre, which, lever * force[:, None, None])
+    return unique, centre / total[:, None, None] if len(unique) else centre, total
+
+
+def segments(run, c):
+    """(lines [k, 2, 2] m, force [k] N): from a floe's centroid to the contact; none on the side of a body that is no
+    floe."""
+    body, lever, force = pairs(c)
+    lines, values = [], []
+    for side in (0, 1):
+        floe = body[:, side] < run.n_floes
+        start = run.wrap(c.pose[body[floe, side], :2])
+        lines.append(np.stack([start, start + lever[floe, side]], axis=1))
+        values.append(force[floe])
+    return np.concatenate(lines), np.concatenate(values)
+
+
+def outlines(run, c):
+    """Floes and bodies at the end of the step: two lists of [n, 2] m."""
+    pose = c.pose.copy()
+    pose[:run.n_floes, :2] = run.wrap(pose[:run.n_floes, :2])
+    for k, b in enumerate(run.bodies):
+        if b.towed:
+            pose[run.n_floes + k, :2] = run.wrap(pose[run.n_floes + k:run.n_floes + k + 1, :2])[0]
+    floes = [place(run.vertices[a:b], p) for a, b, p in zip(run.offsets[:-1], run.offsets[1:], pose)]
+    bodies = [place(b.vertices, p) for b, p in zip(run.bodies, pose[run.n_floes:])]
+    return floes, bodies
+
+
+def with_images(run, shapes):
+    """(copies of shapes [n, 2] m, the number of each) that reach into the domain: what crosses a periodic end comes in
+    at the other."""
+    (x0, x1, y0, y1), (px, py) = run.box, run.period
+    out, which = [], []
+    for shift in ((i * px, j * py) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))):
+        for k, shape in enumerate(shapes):
+            low, high = (np.asarray(shape) + shift).min(axis=0), (np.asarray(shape) + shift).max(axis=0)
+            if not any(shift) or (high >= (x0, y0)).all() and (low <= (x1, y1)).all():
+                out.append(np.asarray(shape) + shift)
+                which.append(k)
+    return out, np.array(which, dtype=int)
+
+
+def view(run, lines, bodies, whole):
+    """(x0, x1, y0, y1) m: the domain, or as much of it as the towed body and the forces need, a tenth of its shorter
+    side around them."""
+    x0, x1, y0, y1 = run.box
+    points = [lines.reshape(-1, 2)] + ([bodies[run.towed]] if run.towed is not None else [])
+    points = np.concatenate(points)
+    if whole or not len(points):
+        return run.box
+    margin = 0.1 * min(x1 - x0, y1 - y0)
+    low, high = np.maximum(points.min(axis=0) - margin, (x0, y0)), np.minimum(points.max(axis=0) + margin, (x1, y1))
+    return low[0], high[0], low[1], high[1]
+
+
+def draw(run, c, whole=False):
+    """The figure."""
+    if len(c.pose) != run.n_floes + len(run.bodies):
+        raise RunError(run.path, f"has {run.n_floes + len(run.bodies)} bodies, the contacts are of {len(c.pose)}",
+                       "give the file that this run dumped")
+    lines, force = segments(run, c)
+    floes, bodies = outlines(run, c)
+    turn = (lambda p: np.asarray(p)[..., ::-1]) if run.geographic else np.asarray
+    x0, x1, y0, y1 = view(run, lines, bodies, whole)
+    across, up = (y1 - y0, x1 - x0) if run.geographic else (x1 - x0, y1 - y0)
+    width = 11.0
+    height = float(np.clip((width - 2.2) * up / across + 1.7, 4.0, 12.0))
+    figure = style.Figure(figsize=(width, height))
+    axes = figure.add_axes((0.7 / width, 0.6 / height, (width - 2.1) / width, (height - 1.5) / height))
+    axes.set_facecolor(style.WATER)
+    axes.add_collection(
+        PolyCollection([turn(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef", edgecolor="#8fa3b3",
+                       linewidth=0.5))
+    for shape, k in zip(*with_images(run, bodies)):
+        body = run.bodies[k]
+        colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
+        axes.add_collection(
+            PolyCollection([turn(shape)],
+                           facecolor=colour,
+                           edgecolor=style.BODY_EDGE if body.towed else colour,
+                           linewidth=0.8,
+                           zorder=2))
+    top = force.max(initial=0.0)
+    if top > 0:
+        lines, which = with_images(run, lines)
+        lines, force = np.array(lines), force[which]
+        order = np.argsort(force)
+        lines, force = lines[order], force[order]
+        least = top * 10 ** -DECADES
+        seen = force >= least
+        widths = WIDEST * np.maximum(force[seen] / top, 1e-12) ** 0.5
+        drawn = LineCollection(turn(lines[seen]),
+                               array=force[seen],
+                               cmap=style.FORCE_MAP,
+                               norm=LogNorm(least, top),
+                               linewidths=np.maximum(widths, 0.4),
+                               capstyle="round",
+                               zorder=3)
+        axes.add_collection(drawn)
+        factor, unit = style.scale([top], "N")
+        bar = figure.colorbar(drawn,
+                              cax=figure.add_axes(
+                                  ((width - 1.15) / width, 0.6 / height, 0.16 / width, (height - 1.5) / height)),
+                              format=lambda v, _: f"{v / factor:g}")
+        bar.set_label(f"impulse / time step ({unit})")
+    axes.set_aspect("equal")
+    low, high = turn(np.array([[x0, y0], [x1, y1]]))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_xlabel("y, east (m)" if run.geographic else "x (m)")
+    axes.set_ylabel("x, north (m)" if run.geographic else "y (m)")
+    words = (
+        f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, "
+        f"none below {10 ** -DECADES:.1g} of the largest"
+        if top > 0 else "no contact bears a force")
+    figure.text(0.02,
+                1 - 0.14 / height,
+                f"{style.title(run)}: force chains at {c.time:g} s",
+                va="top",
+                fontsize=13.5,
+                fontweight="bold")
+    figure.text(0.02, 1 - 0.42 / height, f"{style.conditions(run)}\n{words}", va="top", fontsize=10, color=style.FAINT)
+    return figure
+
+
+def options(p):
+    p.add_argument("run", metavar="RUN", help="output folder of a run")
+    p.add_argument(
+        "contacts",
+        metavar="FILE.h5",
+        type=Path,
+        help=
+        "what --dump-contacts STEP:FILE.h5 of that run wrote; without one, bergtow plot-field --colour force shows the "
+        "largest force on each floe"
+    )
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: RUN/chains.png)")
+    p.add_argument("--whole",
+                   action="store_true",
+                   help="draw the whole domain (default: what holds the towed body and the forces)")
+    arguments.add_force(p)
+
+
+def perform(a):
+    path = arguments.output(a, "chains.png", writing.PICTURES)
+    with Run(a.run) as run:
+        writing.save(draw(run, read(a.contacts), a.whole), path, a.force)

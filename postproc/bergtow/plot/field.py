@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""The ice field of a run before, during and after the tow, with the channel that the body leaves."""
+from bergtow import arguments, writing
+from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.plot import style
+from bergtow.plot.scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+from bergtow.result.run import Run
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+LETTER, TICK = 0.083, 0.48  # room that a letter of a panel's title and a number on its axis take, inches
+
+
+def frames_to_show(run, times):
+    """[(label, frame)]: the frames nearest to the times asked for, else first, half of the tow, last."""
+    if not run.n_frames:
+        raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+    if times:
+        return [("", run.frame_at(t)) for t in times]
+    last = run.n_frames - 1
+    shown = [("before", 0), ("during", last // 2), ("after", last)]
+    return [shown[i] for i in range(3) if i == 0 or shown[i][1] > shown[i - 1][1]]
+
+
+def body_place(run, frame):
+    """(x, y) of the towed body, m: of the series, since frames are wrapped into a periodic domain."""
+    if {"body_x", "body_y"} <= set(run.series_names) and len(run["time"]):
+        at = run.frame_times[frame]
+        sample = int(np.searchsorted(run["time"], at * (1 - 1e-9)))
+        if at > 0 and sample < len(run["time"]):
+            return run["body_x"][sample], run["body_y"][sample]
+    return run.body_pose(frame)[run.towed, :2]
+
+
+def panel_words(run, label, frame, follow):
+    """What stands over a panel: label, time, and where the body is in a view that goes with it."""
+    words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
+    if label:
+        words.insert(0, label)
+    lines = [", ".join(words)]
+    if follow:
+        x, y = body_place(run, frame)
+        lines.append(f"body at ({x:.0f}, {y:.0f}) m")
+    return lines
+
+
+def layout(n, view, turned, lines):
+    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation); lines: of a title
+    between narrow panels.
+
+    Wide views stand one below the other, others side by side; sizes follow from the view, so nothing is left blank.
+    """
+    wide, high = view[1] - view[0], view[3] - view[2]
+    if turned:
+        wide, high = high, wide
+    head, foot, left, gap = 0.98, 0.62, 0.78, 0.42
+    if wide > 1.5 * high:
+        width = 12.0
+        w = width - left - 1.15
+        h = w * high / wide
+        size = (width, head + n * h + (n - 1) * gap + foot)
+        rects = [(left, foot + (n - 1 - i) * (h + gap), w, h) for i in range(n)]
+        length = size[1] - head - foot
+        tall = min(length, 4.5)
+        return size, rects, (left + w + 0.22, foot + (length - tall) / 2, 0.16, tall), "vertical"
+    h = min(6.6, 3.9 * high / wide)
+    w = h * wide / high
+    width = max(left + n * w + (n - 1) * 0.45 + 0.3, 7.0)
+    foot += 0.78
+    head += 0.2 * (lines - 1)
+    size = (width, head + h + foot)
+    spare = (width - left - 0.3 - n * w) / max(n - 1, 1)
+    rects = [(left + i * (w + min(spare, 1.0)), foot, w, h) for i in range(n)]
+    right = rects[-1][0] + w
+    long = min(right - left, 5.0)
+    return size, rects, (left + (right - left - long) / 2, 0.58, long, 0.15), "horizontal"
+
+
+def draw(run, kind="speed", times=(), window="auto"):
+    """The figure. kind: speed, force or thickness; times: s; window: whole, body, or auto."""
+    shown = frames_to_show(run, times)
+    follow = window == "body" or (window == "auto" and needs_window(run))
+    if follow and run.towed is None:
+        raise RunError(run.result, "has no towed body", "use --window whole")
+    view = view_body(run) if follow else view_whole(run)
+    titles = [panel_words(run, label, frame, follow) for label, frame in shown]
+    size, rects, cax, orientation = layout(len(shown), view, run.geographic, max(map(len, titles)))
+    figure = style.Figure(figsize=size)
+    colouring = Colouring(run, kind, [frame for _, frame in shown])
+
+    def inches(rect):
+        return rect[0] / size[0], rect[1] / size[1], rect[2] / size[0], rect[3] / size[1]
+
+    stacked, rafted = orientation == "vertical", False
+    for i, ((_, frame), rect) in enumerate(zip(shown, rects)):
+        axes = figure.add_axes(inches(rect))
+        scene = Scene(axes, run, colouring, view, follow)
+        scene.show(frame)
+        rafted = rafted or scene.rafted
+        one_line = ", ".join(titles[i])
+        axes.set_title(one_line if LETTER * len(one_line) < rect[2] else "\n".join(titles[i]))
+        if not stacked:
+            axes.xaxis.set_major_locator(MaxNLocator(max(2, min(5, int(rect[2] / TICK))), steps=(1, 2, 5, 10)))
+        if stacked and i < len(shown) - 1:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
+        if not stacked and i > 0:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+    if run.n_floes:
+        colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
+    if rafted:
+        figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right",
+                    fontsize=10.5, color=style.RAFTED)
+    style.headline(figure, run, "ice field", 0.2 / size[0], kept=2 if rafted else 0)
+    return figure
+
+
+def options(p):
+    arguments.add_run(p, "field.png")
+    p.add_argument("--colour",
+                   "--color",
+                   choices=COLOURS,
+                   default="speed",
+                   help="what colours the floes (default: speed)")
+    p.add_argument("--times", metavar="T", type=float, nargs="+", default=(),
+                   help="draw the frames nearest to these times, s, in place of first, middle and last")
+    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
+                   help="the whole domain, or a window about the body (default: auto, the body in long domains)")
+
+
+def perform(a):
+    if not np.isfinite(a.times).all():
+        raise BergtowError("--times: not a finite number", USAGE)
+    path = arguments.output(a, "field.png", writing.PICTURES)
+    with Run(a.run) as run:
+        writing.save(draw(run, a.colour, a.times, a.window), path, a.force)

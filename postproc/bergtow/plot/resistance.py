@@ -1,0 +1,416 @@
+# SPDX-License-Identifier: MIT
+"""Mean ice resistance of one or several runs against the concentration, beside the estimates; the same as a table, and
+in words.
+
+Runs of one concentration (other seeds) are drawn one by one, with their mean and its 95 % interval over them, and stand
+in the table as their mean.
+"""
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from bergtow import arguments, writing
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result import at_least, compared
+from bergtow.result.run import Run
+from bergtow.stats import drift as stat_drift
+from bergtow.table import quantity, scale, short
+
+import numpy as np
+
+SAME = 0.02  # share by which the curves of runs in one picture may differ
+
+
+@dataclass
+class Point:
+    """One run."""
+
+    path: Path
+    title: str
+    asked: float          #: ice.concentration, or as made where the case does not say
+    concentration: float  #: as made
+    mean: float           #: N, AtLeast where steps of its window have no solution
+    se: float             #: standard error of the mean, N, NaN where the run gives none
+    low: float            #: 95 % interval of the mean, N, NaN where the run gives none
+    high: float
+    steady: bool          #: the window is that of a steady tow
+    change: float         #: of the ice resistance over the window, N, NaN where the run does not say
+    reference: float      #: N, measured, NaN without one
+    unconverged: float    #: share of the steps
+    warnings: int
+    estimates: dict       #: {name: Estimate}
+    case: dict            #: {key: text}
+    state: str            #: hash of the end, "" where the run does not say
+    conditions: dict      #: of the estimates: thickness_m, width_m, ..., and "curves"
+
+    @property
+    def of_ice(self):
+        """Estimates of the ice resistance."""
+        return {name: e for name, e in self.estimates.items() if not e.on_top}
+
+
+def read(path):
+    """The point of a run's folder."""
+    with Run(path) as run:
+        estimates = run.summary.get("estimates")
+        if not isinstance(estimates, dict) or "curves" not in estimates:
+            raise RunError(run.path / "summary.json", "holds no estimates",
+                           "run a case with a towed body, with this version")
+        if estimates.get("speed_along_m_s") is None:
+            if np.isfinite(run.adrift):
+                raise RunError(run.path / "summary.json", f"is of a tow whose last line parted at {run.adrift:g} s",
+                               "run it with a stronger line, or end it before")
+            raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
+        made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
+        if not np.isfinite(mean):
+            raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
+        from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
+        return Point(path=run.path,
+                     title=style.title(run),
+                     asked=made if from_file else run.value("ice.concentration", made),
+                     concentration=made,
+                     mean=mean,
+                     se=run.number("mean_ice_resistance_se_n"),
+                     low=low,
+                     high=high,
+                     steady=run.verdict[0] == "steady",
+                     change=run.number("window.series.ice_resistance.change_n"),
+                     reference=run.number("reference.mean_force_n"),
+                     unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
+                     warnings=len(run.warnings),
+                     estimates=run.estimates,
+                     case=dict(run.case),
+                     state=str(run.summary.get("state_hash") or ""),
+                     conditions=estimates)
+
+
+def curve(point, name):
+    """(concentration [n], force [n] N, NaN where there is none) of an estimate, for the conditions of a run."""
+    curves = point.conditions["curves"]
+    return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]],
+                                                                    dtype=float)
+
+
+def check_alike(points):
+    """One set of curves must do for all runs. Errors: RunError naming the first two that differ."""
+    first = points[0]
+    for other in points[1:]:
+        # the size of floes as made varies
+        for name in (n for n, e in first.of_ice.items() if not e.uses_floe_size and n in other.of_ice):
+            a, b = curve(first, name)[1], curve(other, name)[1]
+            if not np.array_equal(np.isnan(a), np.isnan(b)) or not np.allclose(a, b, rtol=SAME, atol=0, equal_nan=True):
+                raise RunError(
+                    other.path,
+                    f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
+                    "draw them in pictures of their own")
+        key, here, there = next(compared.unlike(first.case, other.case, ("ice.concentration", )), (None, "", ""))
+        if key:
+            raise RunError(other.path, f"has another case than {first.path}: {key} is {here} there and {there} here",
+                           "draw them in pictures of their own")
+
+
+def once(points):
+    """The points without runs that end in the same state as one before: the same run again, or ice that no seed
+    changes."""
+    seen, out = set(), []
+    for p in points:
+        if p.state and p.state in seen:
+            print(f"bergtow plot-resistance: left out: {p.path}: ends in the same state as a run before it",
+                  file=sys.stderr)
+        else:
+            out.append(p)
+        seen.add(p.state)
+    return out
+
+
+def rows(points):
+    """One row a concentration: (asked, number of runs, how many steady, mean, drift of all (stat_drift.of), standard
+    error, 95 % interval, ratio and force of each estimate, worst share of steps missed).
+
+    Of several runs: mean of the means, error and interval from their scatter. Of one: its own.
+    """
+    out = []
+    for asked in sorted({p.asked for p in points}):
+        some = [p for p in points if p.asked == asked]
+        means = np.array([p.mean for p in some])
+        se, low, high = some[0].se, some[0].low, some[0].high
+        if len(some) > 1:
+            se = means.std(ddof=1) / np.sqrt(len(some))
+            low, high = stat_drift.interval(means)
+        names = [name for name in some[0].estimates if all(name in p.estimates for p in some)]
+        forces = {name: float(np.mean([p.estimates[name].force for p in some])) for name in names}
+        valid, compares = ({name: all(getattr(p.estimates[name], what)
+                                      for p in some)
+                            for name in names}
+                           for what in ("valid", "compares"))
+        mean = at_least.of(means.mean(), [p.mean for p in some])
+        if isinstance(mean, at_least.AtLeast):
+            se = low = high = np.nan
+        out.append({
+            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
+            "drift": stat_drift.of([p.change for p in some], means.mean()),
+            "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
+            "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
+        })
+    return out
+
+
+def table(points):
+    """The rows as a Markdown table: forces in N; in brackets simulated / estimate, where the run is held
+    against it (it is meant for the conditions and knows the concentration); * where the estimate is not meant for the
+    conditions."""
+    names = points[0].of_ice
+    head = [
+        "ice, %", "runs", "simulated, N", "standard error, N", *(e.label for e in names.values()),
+        "steps not converged", "warnings"
+    ]
+    lines = ["| " + " | ".join(head) + " |", "|" + " ---: |" * len(head)]
+    for row in rows(points):
+        cells = [
+            f"{100 * row['concentration']:.3g}",
+            str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"
+        ]
+        for name in names:
+            force = row["forces"].get(name, np.nan)
+            text = "–" if np.isnan(force) else f"{force:.3g}" + ("" if row["valid"][name] else "*")
+            cells.append(text + (f" ({row['mean'] / force:.3g})" if row["compares"].get(name) else ""))
+        cells += [f"{100 * row['unconverged']:.2g} %", str(row["warnings"])]
+        lines.append("| " + " | ".join(cells) + " |")
+    shares = [f"{100 * row['concentration']:.3g} % ice: {at_least.words(row['mean'].share)}." for row in rows(points)
+              if isinstance(row["mean"], at_least.AtLeast)]
+    return "\n".join([*lines, "", *shares] if shares else lines)
+
+
+def words(points):
+    """The rows as sentences: what the ice of each concentration adds, and the estimates meant for it; at last what
+    open water takes."""
+    def of(estimates, row):
+        return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
+                         if row["valid"].get(name) and np.isfinite(row["forces"][name]))
+
+    def verdict(row):
+        n, steady = row["runs"], f"{row['steady']} of {row['runs']}"
+        if row["drift"] is None:
+            return f"{steady} tow{'s' if n > 1 else ''} steady"
+        change, _, moved = row["drift"]
+        if moved:
+            return (f"over all tows the load {'rises' if change > 0 else 'falls'} by {quantity(abs(change), 'N')} in "
+                    f"the window; {steady} steady by themselves")
+        return f"steady over all tows, and {steady} by themselves"
+
+    lines = []
+    for row in rows(points):
+        factor, unit = scale([row["mean"]], "N")
+        mean, low, high = (short(row[key] / factor) for key in ("mean", "low", "high"))
+        held = f" (95 %: {low} to {high})" if np.isfinite(row["low"]) else \
+            f" ({at_least.words(row['mean'].share)})" if isinstance(row["mean"], at_least.AtLeast) else ""
+        lines += [f"{100 * row['concentration']:.3g} % ice adds {mean} {unit}{held}, the mean of {row['runs']} "
+                  f"tow{'s' if row['runs'] > 1 else ''}.", f"    Verdict: {verdict(row)}.",
+                  f"    Estimates: {of(points[0].of_ice, row) or 'none is meant for this ice'}."]
+    on_top = of({name: e for name, e in points[0].estimates.items() if e.on_top}, row)
+    return "\n".join(lines + ([f"Without ice: {on_top}."] if on_top else []))
+
+
+def draw_estimates(axes, points, factor):
+    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for the range of one that gives a
+    range."""
+    first = points[0]
+    valid = first.conditions["curves"]["valid_range"]
+    for k, (name, estimate) in enumerate(first.of_ice.items()):
+        label, colour = estimate.label, style.ESTIMATES[k % len(style.ESTIMATES)]
+        a, force = curve(first, name)
+        low, high = (np.nan if v is None else v for v in valid[name])
+        inside = (a >= low) & (a <= high)
+        with_force = np.where(force > 0, force, np.nan) / factor
+        axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
+        axes.plot(a, with_force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=label)
+        spans = [p.estimates[name].numbers for p in points if name in p.estimates and p.estimates[name].force]
+        spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
+        if spans and spans[0]["high_n"] > spans[0]["low_n"]:
+            down, up = (spans[0][k] / spans[0]["force_n"] for k in ("low_n", "high_n"))
+            axes.fill_between(a,
+                              np.where(inside, with_force * down, np.nan),
+                              np.where(inside, with_force * up, np.nan),
+                              color=colour,
+                              alpha=0.18,
+                              linewidth=0,
+                              zorder=1.2)
+    for estimate in first.estimates.values():
+        if estimate.on_top and estimate.force > 0:
+            axes.axhline(estimate.force / factor,
+                         color=style.FAINT,
+                         linewidth=1,
+                         dashes=(6, 3),
+                         label=f"{estimate.label} (comes on top)")
+
+
+def limits(points, log):
+    """Lower and upper end of the force axis, N: the runs, and the estimates that are meant for what was run."""
+    seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
+    for p in points:
+        for e in p.of_ice.values():
+            if e.valid and e.force:
+                seen += [e.numbers["low_n"], e.numbers["high_n"]]
+    seen = np.array([x for x in seen if np.isfinite(x)])
+    if not log:
+        return min(0.0, seen.min()), 1.1 * max(seen.max(), 1e-12)
+    seen = seen[seen > 0]
+    if not len(seen):
+        return 0.1, 10.0
+    floor = min([p.mean for p in points if p.mean > 0], default=seen.max())
+    # an error bar that reaches zero must not stretch the axis
+    return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()
+
+
+def draw_runs(axes, points, factor, low, log):
+    """The runs, each with its interval where it is alone at its concentration, means of several with theirs, and what
+    was measured; returns how many have no place in the picture."""
+    averaged = [r for r in rows(points) if r["runs"] > 1]
+    alone = np.array([not any(p.asked == r["concentration"] for r in averaged) for p in points])
+    a = np.array([p.concentration for p in points])
+    mean = np.array([p.mean for p in points])
+    below, above = (np.nan_to_num(np.array(x))
+                    for x in ([p.mean - p.low for p in points], [p.high - p.mean for p in points]))
+    steady = np.array([p.steady for p in points])
+    shown = mean > 0 if log else np.full(len(mean), True)
+    below = np.minimum(below, mean - low / 2) if log else below
+    for which, face, label in ((steady & alone, style.ICE, "simulated, 95 % of the run's mean"),
+                               (~steady & alone, style.PAPER, "window not steady or too short")):
+        which = which & shown
+        if which.any():
+            axes.errorbar(a[which],
+                          mean[which] / factor,
+                          yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor,
+                          fmt="o",
+                          color=style.ICE,
+                          markerfacecolor=face,
+                          markersize=6,
+                          capsize=3,
+                          linewidth=1.4,
+                          zorder=5,
+                          label=label)
+    for which, face, label in ((steady & ~alone, style.ICE, "simulated, a tow"),
+                               (~steady & ~alone, style.PAPER, "a tow, not steady or too short")):
+        which = which & shown
+        if which.any():
+            axes.plot(a[which], mean[which] / factor, "o", color=style.ICE, markerfacecolor=face, markersize=4,
+                      alpha=0.6, zorder=4, label=label)
+    least = [(p.concentration, p.mean / factor) for p in points
+             if isinstance(p.mean, at_least.AtLeast) and (p.mean > 0 or not log)]
+    if least:
+        axes.plot(*zip(*least), linestyle="none", marker="^", color=style.JAM, markersize=7, zorder=7,
+                  label="simulated, at least")
+    if averaged:
+        centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
+        reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
+        axes.errorbar([r["concentration"] for r in averaged],
+                      centre / factor,
+                      yerr=np.array([np.maximum(reach, 0), high_end - centre]) / factor,
+                      fmt="s",
+                      color=style.INK,
+                      markersize=5,
+                      capsize=5,
+                      linewidth=1.8,
+                      zorder=6,
+                      label="mean of the tows, 95 % (t)")
+    measured = [p for p in points if np.isfinite(p.reference)]
+    if measured:
+        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured],
+                  "D",
+                  color=style.REFERENCE,
+                  markersize=6,
+                  zorder=6,
+                  label="measured")
+    return np.count_nonzero(~shown)
+
+
+def write_around(figure, points, lost, hidden):
+    """Heading and notes. lost: legends of what is beyond the axes; hidden: runs that are."""
+    e = points[0].conditions
+    figure.text(
+        0.02,
+        0.98,
+        f"{points[0].title}: ice resistance and estimates" if len(points) == 1 else "Ice resistance and estimates",
+        va="top",
+        fontsize=13.5,
+        fontweight="bold")
+    figure.text(0.02,
+                0.94,
+                f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
+                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}",
+                va="top",
+                color=style.FAINT)
+    notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
+    notes += ["out of the picture:", *lost] if lost else []
+    if e["length_scale"] != 1:
+        notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
+    if hidden:
+        notes.append(f"{hidden} run(s) without resistance not shown")
+    some = [p.mean.share for p in points if isinstance(p.mean, at_least.AtLeast)]
+    if some:
+        notes.append(f"{len(some)} run(s) at least this: in up to\n{100 * max(some):.2g} % of the steps the load\n"
+                     "has no bound")
+    doubtful = sum(p.warnings > 0 for p in points)
+    if doubtful:
+        notes.append(f"{doubtful} of {len(points)} runs carry warnings")
+    figure.text(0.735, 0.1, "\n".join(notes), va="bottom", fontsize=9, color=style.FAINT)
+
+
+def draw(points, log=True):
+    """The figure of resistance against concentration."""
+    check_alike(points)
+    low, high = limits(points, log)
+    factor, unit = style.scale([high / 3 if log else high], "N")
+    figure = style.Figure(figsize=(11, 7))
+    axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
+    draw_estimates(axes, points, factor)
+    hidden = draw_runs(axes, points, factor, low, log)
+    if log:
+        style.logarithmic(axes.yaxis)
+    axes.set_ylim(low / factor, high / factor)
+    axes.set_xlim(0, 1)
+    axes.set_xlabel("ice concentration")
+    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.grid(which="major")
+    handles, labels, lost = style.legend_of(axes)
+    ours = ("simulated", "mean of the tows", "a tow", "window", "measured")
+    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith(ours))
+    axes.legend([handles[i] for i in order], [labels[i] for i in order],
+                loc="upper left",
+                bbox_to_anchor=(1.02, 1.0),
+                borderaxespad=0,
+                handlelength=2.4,
+                labelspacing=0.8)
+    write_around(figure, points, lost, hidden)
+    return figure
+
+
+def options(p):
+    p.add_argument("run",
+                   metavar="RUN",
+                   nargs="+",
+                   help="output folders of runs that differ in concentration and seed only")
+    p.add_argument("-o",
+                   "--output",
+                   metavar="FILE",
+                   type=Path,
+                   help="file to write (default: resistance.png beside the first RUN)")
+    p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
+    p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
+    p.add_argument("--words", action="store_true", help="also print the numbers as sentences")
+    arguments.add_force(p)
+
+
+def perform(a):
+    path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
+    arguments.ends_in(path, writing.PICTURES)
+    for place in filter(None, (path, a.table)):
+        writing.may_write(place, a.force)
+    points = once([read(run) for run in a.run])
+    writing.save(draw(points, not a.linear), path, a.force)
+    if a.table:
+        writing.write_markdown(table(points), a.table, a.force)
+        print(a.table)
+    if a.words:
+        print(f"\n{words(points)}")

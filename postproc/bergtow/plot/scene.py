@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: MIT
+"""The ice field of one frame on one axes: water, floes, towed body, walls; shared by bergtow plot-field and bergtow
+film.
+Orientation. The basin frame is drawn as it is: x to the right, y upwards. The geographic frame (x north, y east) is
+drawn as a map: the horizontal axis is y, the vertical axis is x.
+
+A view is (x0, x1, y0, y1) in m of the world frame, or relative to the towed body when the scene follows it.
+"""
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator
+
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.result import overlaps as rafted
+from bergtow.result.run import place
+
+COLOURS = ("speed", "force", "thickness")
+
+
+class Colouring:
+    """What the floes are coloured by: values of a frame, colour map, limits over the frames shown, label."""
+
+    def __init__(self, run, kind, frames):
+        self.run, self.kind = run, kind
+        samples = np.concatenate([self._raw(i) for i in frames]) if run.n_floes else np.zeros(1)
+        unit, power, self.extend = {"speed": "m/s", "force": "N", "thickness": "m"}[kind], 1.0, "neither"
+        if kind == "thickness":
+            low, high = float(samples.min()), float(samples.max())
+            if high - low < 1e-9 * high:  # one thickness: the white end of the map
+                low, high = 0.0, high
+        else:
+            # A few collisions are far above the rest; a scale to the maximum would show everything else as at rest.
+            moving = samples[samples > 0]
+            high = float(np.percentile(moving, 99)) if len(moving) else 1.0
+            low = 0.0
+            if kind == "speed" and run.value("tow.speed", 0) > 0:
+                high = run.value("tow.speed")
+            if kind == "force":
+                power = 0.5
+            if samples.max() > high:
+                self.extend = "max"
+        self.factor, unit = style.scale([high], unit) if kind == "force" else (1.0, unit)
+        low, high = low / self.factor, (high or 1.0) / self.factor
+        self.norm = Normalize(low, high, clip=True) if power == 1.0 else PowerNorm(power, low, high, clip=True)
+        self.cmap = {"speed": style.SPEED_MAP, "force": style.FORCE_MAP, "thickness": style.THICKNESS_MAP}[kind]
+        self.label = {"speed": f"floe speed ({unit})", "force": f"largest contact force on the floe ({unit})",
+                      "thickness": f"ice thickness ({unit})"}[kind]
+
+    def _raw(self, frame):
+        if self.kind == "thickness":
+            return self.run.thickness
+        return self.run.speed(frame) if self.kind == "speed" else self.run.least_contact_force(frame)
+
+    def values(self, frame):
+        """[N] in the units of the label."""
+        return self._raw(frame) / self.factor
+
+    def bar(self, figure, mappable, cax, orientation="vertical"):
+        """The colour bar on the axes cax."""
+        bar = figure.colorbar(mappable, cax=cax, orientation=orientation, extend=self.extend,
+                              extendfrac=0.03, label=self.label)
+        bar.outline.set(linewidth=0.6, edgecolor=style.FAINT)
+        bar.ax.tick_params(length=3)
+        if self.kind == "force":
+            top = self.norm.vmax
+            ticks = _round_steps(top)
+            bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
+        return bar
+
+
+def _round_steps(top):
+    """Four or five round numbers from 0 to top that are spread out on a square-root scale."""
+    ticks = {0.0}
+    for fraction in (0.05, 0.2, 0.5, 1.0):
+        step = 10 ** np.floor(np.log10(top * fraction))
+        ticks.add(float(np.floor(top * fraction / step + 1e-9) * step))
+    return sorted(ticks)
+
+
+def tow_heading(run, time=0.0):
+    """Unit vector (x, y) of the leg on which the towing end is at a time, or None for a body that drifts."""
+    if run.towed is None or run.case.get("tow.mode") == "none":
+        return None
+    passed = sum(e["kind"] == "waypoint" and e["time_s"] <= time for e in run.events)
+    return run.headings[min(passed, len(run.headings) - 1)]
+
+
+def body_size(run):
+    """Largest extent of the towed body, m; 0 without one."""
+    if run.towed is None:
+        return 0.0
+    return 2 * float(np.hypot(*run.bodies[run.towed].vertices.T).max())
+
+
+def view_whole(run):
+    """The domain with a margin that shows the walls."""
+    x0, x1, y0, y1 = run.box
+    margin = 0.02 * max(x1 - x0, y1 - y0) if any(b.wall for b in run.bodies) else 0.0
+    margin = min(margin, 0.08 * min(x1 - x0, y1 - y0))
+    px, py = run.period
+    mx, my = (0.0 if px else margin), (0.0 if py else margin)
+    return x0 - mx, x1 + mx, y0 - my, y1 + my
+
+
+def needs_window(run):
+    """Whether the domain is too long, or the body too small in it, for a picture of the whole."""
+    x0, x1, y0, y1 = run.box
+    long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
+    return run.towed is not None and (long > 12 * short or long > 60 * body_size(run))
+
+
+def view_body(run):
+    """A window about the body, relative to it: 20 bodies long or more, 9 wide or the domain, more behind than ahead."""
+    x0, x1, y0, y1 = run.box
+    size, heading = body_size(run), tow_heading(run)
+    heading = np.array([1.0, 0.0]) if heading is None else heading
+    along_x = abs(heading[0]) >= abs(heading[1])
+    reach = np.array([20.0, 9.0] if along_x else [9.0, 20.0]) * size
+    reach = np.minimum(reach, 1.04 * np.array([x1 - x0, y1 - y0]))
+    along, across = (0, 1) if along_x else (1, 0)
+    reach[along] = min(max(reach[along], 3.4 * reach[across]), (x1 - x0, y1 - y0)[along])
+    shift = -0.15 * heading * reach
+    left, right = shift[0] - reach[0] / 2, shift[0] + reach[0] / 2
+    if run.case.get("domain.ends") == "moving":  # what lies beyond it is the ice of its other end
+        ahead = run.value("domain.ahead", (x1 - x0) / 2)
+        behind = x1 - x0 - ahead
+        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right,
+                                                                              ahead if heading[0] >= 0 else behind)
+    return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
+
+
+def tow_line(run, frame, position):
+    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where
+    all have broken.
+
+    None without a line.
+    """
+    at = run.frame_times[frame]
+    if run.case.get("tow.mode") not in (
+            "line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+        return None
+    sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
+    if sample >= len(run["time"]):
+        return None
+    ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
+    end, points = position + ahead, []
+    broken = {e["subject"]: e["time_s"] for e in run.events if e["kind"] == "line_broken"}
+    for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
+        if broken.get(branch + 1, np.inf) > at:
+            hull = place(
+                [[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]],
+                [*position, run.body_pose(frame)[run.towed, 2]])
+            points += [hull[0]] if points else [hull[0], end]
+    return np.array(points or [end])
+
+
+class Scene:
+    """Artists of the ice field on an axes.
+
+    view       (x0, x1, y0, y1) m
+    follow     the view is relative to the towed body, and so are the axes
+    animated   artists are left out of the figure's own drawing (for blitting)
+    """
+
+    def __init__(self, axes, run, colouring, view, follow=False, animated=False):
+        self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
+        x0, x1, y0, y1 = run.box
+        self._turn = run.geographic
+        # what lies within half a period of it is shown
+        self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2
+        view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
+        axes.set_xlim(*view[:, 0])
+        axes.set_ylim(*view[:, 1])
+        axes.set_aspect("equal")
+        axes.set_facecolor(style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        relative = " from the body" if follow else ""
+        names = (f"y east{relative} (m)", f"x north{relative} (m)") if self._turn else \
+            (f"x{relative} (m)", f"y{relative} (m)")
+        wide, high = view[1] - view[0]
+        axes.xaxis.set_major_locator(MaxNLocator(9 if wide > 2 * high else 5, steps=(1, 2, 5, 10)))
+        axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
+        axes.set_xlabel(names[0])
+        axes.set_ylabel(names[1])
+
+        # Walls go on without end along a periodic direction; a view about the body may look over the seam.
+        px, py = run.period if follow else (0.0, 0.0)
+        self._images = [
+            np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
+        ]
+        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        self._corners = corners
+        kept = dict(animated=animated)
+        self._water = Polygon(self._flat(corners),
+                              closed=True,
+                              facecolor=style.WATER,
+                              edgecolor="none",
+                              zorder=0,
+                              **kept)
+        width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
+        floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
+        self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
+                                     linewidths=float(np.clip(0.035 * floe_pt, 0.1, 0.6)), zorder=2, **kept)
+        self.rafted = False  #: does the frame that is shown have floes over each other?
+        self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
+        self._rafts = run.value("ice.rafting.kappa", 0) > 0
+        self._floes.set_rasterized(run.n_floes > style.MANY / 6)
+        self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
+        self._solid.set_facecolors([style.WALL if b.wall else style.FIXED for b in run.bodies if not b.towed]
+                                   * len(self._images))
+        self._track = Line2D([], [], color=style.TRACK, linewidth=1.1, dashes=(1, 2.2), dash_capstyle="round",
+                             alpha=0.9, zorder=3, **kept)
+        self._line = Line2D([], [], color=style.BODY_EDGE, linewidth=1.3, marker="s", markersize=4.5, markevery=[1],
+                            path_effects=[patheffects.withStroke(linewidth=3, foreground=style.HALO)], zorder=5.5,
+                            **kept)
+        self._body = PolyCollection([], facecolors=style.BODY, edgecolors=style.BODY_EDGE, linewidths=1.2, zorder=6,
+                                    visible=run.towed is not None, **kept)
+        self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,
+                              linewidth=1.0, zorder=7, visible=False, **kept)
+        self._heading = tow_heading(run)
+        if run.case.get("tow.mode") == "line":
+            self._heading = None  # the line itself shows it
+        self._arrow.set_visible(self._heading is not None)
+        self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
+        edges = [] if follow else self._edges(**kept)
+        #: in the order of drawing
+        self.artists = [
+            self._water, self._floes, self._rafted, self._track, self._solid, *edges, self._line, self._body,
+            self._arrow
+        ]
+        axes.add_patch(self._water)
+        axes.add_collection(self._floes, autolim=False)
+        axes.add_collection(self._rafted, autolim=False)
+        axes.add_line(self._track)
+        axes.add_collection(self._solid, autolim=False)
+        axes.add_line(self._line)
+        axes.add_collection(self._body, autolim=False)
+        axes.add_patch(self._arrow)
+        for edge in edges:
+            axes.add_line(edge)
+
+    @property
+    def mappable(self):
+        return self._floes
+
+    def _flat(self, xy):
+        """World coordinates [..., 2] to (horizontal, vertical) of the picture."""
+        return xy[..., ::-1] if self._turn else xy
+
+    def show(self, frame):
+        """Put the artists where the frame has them."""
+        run = self.run
+        if not run.n_frames:
+            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        position, centre = np.zeros(2), None
+        if run.towed is not None:
+            position = run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2])[0]
+        origin = np.zeros(2)
+        if self.follow:
+            origin, centre = position, position
+        outlines, index = run.polygon_array(frame, position + self._middle if self.follow else None)
+        self._floes.set_verts(self._flat(outlines - origin))
+        self._floes.set_array(self.colouring.values(frame)[index])
+        if self._rafts:
+            over = rafted.overlaps(outlines)
+            self._rafted.set_verts([self._flat(p - origin) for p in over])
+            self.rafted = len(over) > 0
+        bodies = run.body_polygons(frame, centre)
+        self._solid.set_verts([self._flat(p + shift - origin) for shift in self._images
+                               for p, b in zip(bodies, run.bodies) if not b.towed])
+        self._water.set_xy(self._flat(self._unbounded(self._corners) - origin))
+        if run.towed is None:
+            return
+        self._body.set_verts([self._flat(bodies[run.towed] + shift - origin) for shift in self._images])
+        self._show_track(frame, origin)
+        self._show_line(frame, position - origin)
+        if self._heading is not None:
+            self._heading = tow_heading(run, run.frame_times[frame])
+            self._show_arrow(position - origin, bodies[run.towed] - origin)
+
+    def _edges(self, **kept):
+        """Dashed lines along the edges of the domain that are open or periodic."""
+        a, b, c, d = self._corners
+        lines = []
+        if self.run.case.get("domain.ends") in ("open", "periodic", "moving"):
+            lines += [(a, d), (b, c)]
+        if self.run.case.get("domain.sides") in ("open", "periodic"):
+            lines += [(a, b), (d, c)]
+        return [Line2D(*self._flat(np.array(line)).T, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5,
+                       clip_on=False, **kept) for line in lines]
+
+    def _unbounded(self, corners):
+        """The water, without end along periodic directions."""
+        grow = np.where(np.array(self.run.period) > 0, 1e3, 1.0)
+        middle = corners.mean(axis=0)
+        return middle + (corners - middle) * grow
+
+    def _show_track(self, frame, origin):
+        """The way the body has come, broken where it left one end of a periodic domain for the other."""
+        run = self.run
+        if "body_x" not in run or "body_y" not in run:
+            return
+        time = run["time"]
+        done = time <= run.frame_times[frame] + 1e-9 * max(time[-1:], default=0)
+        step = max(1, int(done.sum()) // 400)
+        way = np.stack([run["body_x"][done], run["body_y"][done]], axis=1)[::-1][::step][::-1]
+        if self.follow:
+            period = np.array([p if p > 0 else np.inf for p in run.period])
+            last = way[-1] if len(way) else origin
+            way = way + np.where(np.isfinite(period), np.round(
+                (origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
+        elif len(way):
+            wrapped = run.wrap(way)
+            jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
+                                  .any(axis=1)) + 1
+            way = np.insert(wrapped, jump, np.nan, axis=0)
+        self._track.set_data(*self._flat(way - origin).T)
+
+    def _show_line(self, frame, position):
+        """The tow line from the hull to its towing end, a square; two branches meet there; none that has broken."""
+        points = tow_line(self.run, frame, position)
+        if points is not None:
+            self._line.set_markevery([min(1, len(points) - 1)])  # the end alone where all branches have broken
+            self._line.set_data(*self._flat(points).T)
+
+    def _show_arrow(self, position, outline):
+        """An arrow ahead of the body, along the tow."""
+        u = self._heading
+        n = np.array([-u[1], u[0]])
+        ahead = position + u * (((outline - position) @ u).max() + 0.22 * self._arrow_length)
+        size = self._arrow_length
+        shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]
+                          ]) * size
+        self._arrow.set_xy(self._flat(ahead + shape[:, :1] * u + shape[:, 1:] * n))

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""What each assumption does to the mean: the variants of a study against its first one, as a tornado.
+
+    variants.png      a panel for each combination of the other values that were varied; a bar a variant, as long as the
+                      change of the mean in per cent of that of the first variant, with its 95 % interval (t). Fields
+                      that two variants have in common (fields: common) are compared one by one, other means by
+                      Welch's t. Below: the means themselves
+"""
+import numpy as np
+import scipy
+
+from bergtow.plot import style
+from bergtow.result.members import worded
+from bergtow.stats import mean as stat_mean
+
+KEY = "variant"
+
+
+def relative_change(means, base, paired):
+    """Change of the mean in per cent of that of `base`, and the half width of its 95 % interval; both NaN where one of
+    them has fewer than two fields. means, base: {repeat: mean of that field}."""
+    if paired:
+        both = sorted(set(means) & set(base))
+        if len(both) < 2:
+            return np.nan, np.nan
+        of, to = (np.array([x[k] for k in both]) for x in (means, base))
+        # d(a/b) by the first order of the quotient: each field's share in the ratio of the means.
+        ratio = of.mean() / to.mean()
+        shares = (of - ratio * to) / to.mean()
+        low, high = stat_mean.t_interval(shares)
+        return 100 * (ratio - 1), 50 * (high - low)
+    of, to = (np.array(list(x.values())) for x in (means, base))
+    if min(len(of), len(to)) < 2:
+        return np.nan, np.nan
+    ratio = of.mean() / to.mean()
+    a, b = of.var(ddof=1) / len(of) / to.mean()**2, ratio**2 * to.var(ddof=1) / len(to) / to.mean()**2
+    freedom = (a + b)**2 / (a**2 / (len(of) - 1) + b**2 / (len(to) - 1)) if a + b > 0 else 1
+    return 100 * (ratio - 1), 100 * scipy.stats.t.ppf(0.5 + stat_mean.LEVEL / 2, freedom) * np.sqrt(a + b)
+
+
+def panels(e):
+    """[(words for the other values, name of the first variant, its mean, [(variant, mean, change, half width)])]."""
+    order = list(dict.fromkeys(e.parameters[KEY].tolist()))
+    found = {}
+    for c in e.conditions():
+        others = tuple((k, v) for k, v in c.values.items() if k != KEY)
+        rows = c.finished
+        found.setdefault(others, {})[c.values[KEY]] = rows
+    out = []
+    for others, some in found.items():
+        of = {name: dict(zip(e.repeat[rows].tolist(), e.mean[rows]))
+              for name, rows in some.items() if len(rows)}
+        first = order[0]
+        if first not in of or len(of) < 2:
+            continue
+        seeds = {name: set(e.seed[some[name]].tolist()) for name in of}
+        changes = [(name, np.mean(list(of[name].values())),
+                    *relative_change(of[name], of[first], bool(seeds[name] & seeds[first])))
+                   for name in order[1:] if name in of]
+        words = ", ".join(worded(k, v, e.units[k], 3) for k, v in others)
+        out.append((words, first, np.mean(list(of[first].values())), changes))
+    return out
+
+
+def draw(e, headline):
+    """The figure, or None where the study has no variants with a first one to compare with."""
+    some = panels(e) if KEY in e.parameters else []
+    if not some:
+        return None
+    names = list(dict.fromkeys(name for *_, changes in some for name, *_ in changes))
+    # The longest bar on top, by the largest change in any panel.
+    reach = {n: max((abs(c) for *_, changes in some for m, _, c, _ in changes if m == n and np.isfinite(c)), default=0)
+             for n in names}
+    names.sort(key=lambda n: reach[n])
+    figure, grid = style.subplots(1, len(some), figsize=(2.0 + 3.6 * len(some), 2.3 + 0.36 * len(names)), sharey=True,
+                                squeeze=False)
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=1.8 / width, right=0.98, top=1 - 1.25 / height, bottom=0.75 / height, wspace=0.08)
+    factor, unit = style.scale([m for *_, changes in some for _, m, *_ in changes], "N")
+    for axes, (words, first, base, changes) in zip(grid[0], some):
+        widest = max((abs(c) + (h if np.isfinite(h) else 0) for *_, c, h in changes if np.isfinite(c)), default=1)
+        for name, mean, change, half in changes:
+            y = names.index(name)
+            axes.barh(y, change, height=0.6, color=style.DRAG if change < 0 else style.TOW)
+            if np.isfinite(half):
+                axes.plot([change - half, change + half], [y, y], color=style.INK, linewidth=1.2)
+            axes.annotate(style.short(mean / factor), (1.0, y), xycoords=("axes fraction", "data"), xytext=(-4, 0),
+                          textcoords="offset points", ha="right", va="center", fontsize=8.5, color=style.FAINT)
+        axes.axvline(0, color=style.INK, linewidth=0.8)
+        axes.set_xlim(-1.15 * widest, 1.5 * widest)
+        axes.set_title(f"{words or 'the case'}\n{first}: {style.short(base / factor)} {unit}", fontsize=10)
+        axes.grid(True, axis="x")
+    grid[0, 0].set_yticks(np.arange(len(names)), names)
+    figure.supxlabel("change of the mean ice resistance, %", fontsize=10, y=0.26 / height)
+    figure.text(0.3 / width, 0.08 / height, f"black: 95 %; at the right: the mean, {unit}", fontsize=9,
+                color=style.FAINT)
+    headline(figure, e, f"what each assumption does to the mean, against \"{some[0][1]}\"")
+    return figure

@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: MIT
+"""What the report of an ensemble says: the tables of bergtow statistics, the pictures of bergtow plot-ensemble, and
+every member with its doubts.
+
+The tables come from text/ensemble.py as Markdown, so that the page, the terminal and the README of a study say the
+same.
+"""
+import argparse
+import os
+import sys
+from dataclasses import replace
+from itertools import groupby
+
+from bergtow import table as text_table
+from bergtow.errors import RunError
+from bergtow.plot import style
+from bergtow.plot import design_value as plot_design
+from bergtow.plot import ensemble as plot_ensemble
+from bergtow.reporting import method as report_method
+from bergtow.reporting import run as report_run
+from bergtow.result import compared, findings
+from bergtow.result import origins as report_case
+from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
+from bergtow.result.origins import scrubbed
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import conditions as ensemble
+from bergtow.stats import design_value as statement
+from bergtow.stats import fit as stat_fit
+from bergtow.study import analysis
+from bergtow.text import ensemble as ensemble_text
+from bergtow.text import loads as loads_text
+
+import numpy as np
+
+#: keys that no result follows from
+TONNE_FORCE = 9806.65  # N
+PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
+#: keys that decide the force, and stand among the assumptions wherever their values are from
+DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "water.current_y", "air.wind_x",
+          "air.wind_y")
+STATUS = {FINISHED: "finished", FAILED: "failed"}
+WARNED = "WARNING: "
+#: as bergtow statistics has them
+OPTIONS = {
+    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
+    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
+}
+
+
+def unbroken(text):
+    """With a percent sign that stays on the line of its number."""
+    return text.replace(" %", "\u00a0%")
+
+
+def cells(line):
+    return [unbroken(cell.strip()) for cell in line.strip().strip("|").split(" | ")]
+
+
+def blocks(markdown):
+    """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"},
+    {"kind": "text", "lines", "warnings"}]."""
+    out = []
+    lines = [line for line in markdown.splitlines() if line.strip()]
+    for kind, some in groupby(lines,
+                              key=lambda line: "heading" if line.startswith("#") else "table"
+                              if line.startswith("|") else "text"):
+        some = list(some)
+        if kind == "heading":
+            out += [{"kind": kind, "text": line.lstrip("# ")} for line in some]
+        elif kind == "table":
+            out.append({"kind": kind, "head": cells(some[0]), "rows": [cells(line) for line in some[2:]]})
+        else:
+            warned = [line[len(WARNED):] for line in some if line.startswith(WARNED)]
+            out.append({"kind": kind, "lines": [line for line in some if not line.startswith(WARNED)],
+                        "warnings": warned})
+    return out
+
+
+def sections(markdown):
+    """(lines of the section on the members, [(heading, blocks)] of all others)."""
+    found = blocks(markdown)
+    starts = [k for k, b in enumerate(found) if b["kind"] == "heading"]
+    parts = [(found[a]["text"], found[a + 1:b]) for a, b in zip(starts[1:], [*starts[2:], len(found)])]
+    intro = [line for title, some in parts if title == "Members" for b in some for line in b["lines"]]
+    return intro, [part for part in parts if part[0] != "Members"]
+
+
+def worth(value, low, high, least=-np.inf):
+    """(value, interval) of a force in words: to three digits, up where the nearest lies below `least` and the value
+    does not; to the two digits that the wider side of the interval leaves; "no bound" where it has no end."""
+    factor, unit = style.scale([value], "N")
+    high = text_table.bound(value, high)
+    place = text_table.last_place(value / factor, low / factor, high / factor)
+    said = style.quantity(text_table.designed(value, least), "N")
+    if place is None:
+        return said, "–"
+    return said, f"{' to '.join(text_table.to_place(x / factor, place) for x in (low, high))} {unit}"
+
+
+MARGIN = 1.05  # times the largest value simulated: what is less has little room for what was not seen
+#: marks behind a design value, and their footnotes
+FOOTNOTES = {
+    "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
+    "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few, or farther apart "
+         "than the return time.",
+    "‡": "less than 5 % above the largest simulated: little margin for so long a return time."
+}
+
+
+def marks(d):
+    """Those of FOOTNOTES that a design value carries."""
+    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] < MARGIN * d["largest"]}
+    return "".join(mark for mark, there in carried.items() if there)
+
+
+def design_row(c):
+    """Cells of a condition in the answer."""
+    tow, tension = c["design"]["tow"], c["design"]["tension"]
+    if tow is None:
+        return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
+    def cells(d):
+        if d is None or "value" not in d:
+            return ["–", "no value" if d else "–"]
+        value, interval = worth(d["value"], *d["interval_95"], d["largest"])
+        return [value + marks(d), interval]
+    return [unbroken(c["label"]), *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
+            report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
+            str(tow["fields"]), text_table.number(tow["hours"])]
+
+
+def answer(e, s, cases, results):
+    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for. cases:
+    those of statement.cases(); results: those of other commands, as results_beside() has them."""
+    rows = [design_row(c) for c in s["conditions"]]
+    head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
+            "largest simulated", "in the start", "fields", "hours"]
+    notes = ["Largest simulated: of the same moving mean."]
+    if all(row[3] == "–" for row in rows):  # no line
+        head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
+    if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
+        notes.append("In the start: of the same moving mean, the largest that begins before the window, which is in "
+                     "no other number.")
+    else:
+        head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
+    asked, held = loads_text.asked(s), loads_text.holds_for(s)
+    figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
+        s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
+        lambda key: reading(key, e.units[key])[0]))
+    out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
+    out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
+    carried = "".join(cell for row in rows for cell in row[1:])
+    notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
+    notes += [loads_text.steps(s)] if loads_text.steps(s) else []
+    out += [table(head, rows), lines(" ".join(notes), faint=True)]
+    out += [figure] if figure else []
+    out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
+             "rows": report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
+    return out + [lines(held)] * bool(held)
+
+
+def governing(s):
+    """The condition with the largest design value in a sentence, with its tonnes-force, in which vessels are rated."""
+    some = [c for c in s["conditions"] if c["design"]["tow"] and "value" in c["design"]["tow"]]
+    if not some:
+        return "No condition has a design tow force."
+    c = max(some, key=lambda c: c["design"]["tow"]["value"])
+    d = c["design"]["tow"]
+    def both(x, least=-np.inf):
+        """A force and the same number in tonnes-force."""
+        x = text_table.designed(x, least)
+        return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
+            "without bound"
+    said, high = without_value(s, d["value"]), text_table.bound(d["value"], d["interval_95"][1])
+    said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
+             f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
+    if np.isinf(high):
+        said += ": these fields do not know how far the tail reaches, and it is no value to build on"
+    return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
+                   if statement.start_exceeds(d) else ".")
+
+
+def without_value(s, value):
+    """A sentence on the conditions that have no design tow force, "" where all have one."""
+    rest = [c for c in s["conditions"] if not (c["design"]["tow"] and "value" in c["design"]["tow"])]
+    if not rest:
+        return ""
+    names = ", ".join(unbroken(c["label"]) for c in rest)
+    most = max((c["design"]["tow"]["largest"] for c in rest if c["design"]["tow"]), default=np.nan)
+    reached = f", but {report_run.force(most)} in the simulation: the largest value of this study is not known" \
+        if most > value else ""
+    return f"No value for {names}{reached}. "
+
+
+def lines(*some, faint=False):
+    return {"kind": "text", "lines": list(some), "warnings": [], "faint": faint}
+
+
+def table(head, rows):
+    return {"kind": "table", "head": head, "rows": rows}
+
+
+def kind_of(warning):
+    """The code of a warning with the names among its values, of keys or series: its numbers make no other kind."""
+    return " ".join([warning["code"], *(v for v in warning["values"].values() if isinstance(v, str))])
+
+
+def members(e, s):
+    """Rows of all members: what was varied, status, mean, doubts, state hash, warnings in words."""
+    labels = {c.index: c.label for c in e.conditions()}
+    by_name, out = {row["name"]: row for row in s["members"]}, []
+    for m in range(e.n):
+        row = by_name.get(e.name[m])
+        mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
+        warned = e.warnings(m) if e.status[m] == FINISHED else []
+        out.append({
+            "name": e.name[m], "condition": unbroken(labels[e.condition[m]]), "seed": int(e.seed[m]),
+            "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
+            "doubts": ", ".join(sorted(e.doubts(m))),
+            "kinds": {kind_of(w): scrubbed(w["text"]) for w in reversed(warned)},
+            "reported": [scrubbed(w) for w in [e.reason[m], *(w["text"] for w in warned)] if w]
+        })
+    return out
+
+
+def kinds_of_warnings(some):
+    """Warnings of one kind as one, in the words of the first with the number of members: rows of members()."""
+    found = {}
+    for row in some:
+        for kind, text in reversed(row["kinds"].items()):
+            found.setdefault(kind, [text, 0])[1] += 1
+    return [f"{text} ({n} member{'s' if n > 1 else ''})" for text, n in found.values()]
+
+
+def study_text(e):
+    """The study as it was given, or as the file has it."""
+    try:
+        return (e.path / "study.yml").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return e.study.split("# base case")[0]
+
+
+def provenance(e):
+    """Rows of the first member that can be read."""
+    for m in np.flatnonzero(e.status == FINISHED):
+        try:
+            with Run(e.folder(m)) as run:
+                return [(name, value) for name, value in report_run.provenance(run)
+                        if name not in ("state hash", "wall time", "folder", "started", "host")]
+        except RunError:
+            continue
+    return []
+
+
+def caption(name):
+    """Words for a picture of bergtow plot-ensemble by its name, "sweep-ice-concentration"."""
+    if name.startswith("sweep-"):
+        return "Mean ice resistance against " + short_key(name[6:].replace("-", ".", 1))
+    if name.startswith("above-"):
+        return f"How much of the time the {name[6:].replace('-', ' ')} is above a level"
+    if name.startswith("returns-"):
+        return f"How often the {name[8:].replace('-', ' ')} is exceeded"
+    return {
+        "map": "Mean ice resistance over two parameters, and its interval",
+        "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"
+    }.get(name, name)
+
+
+def pictures(e, options, s):
+    """{name: picture} of those of bergtow plot-ensemble that the study supports."""
+    drawn = plot_ensemble.pictures(e, options, s["conditions"])
+    return {name: p for name, p in ((name, report_run.picture(name, caption(name), draw)) for name, draw in drawn) if p}
+
+
+#: chapters of the tables of text/ensemble.py: heading, tables, beginnings of the names of the pictures behind each
+CHAPTERS = (("Loads", (("Loads", ()), ("Quantiles of loads", ("above", )), ("Return levels of loads", ("returns", )),
+                       ("Peaks of collisions", ("exceedance", )))),
+            ("Mean ice resistance",
+             (("Mean ice resistance", ("sweep", "map", "variants")), ("Comparison with published estimates", ()),
+              ("Distributions", ()), ("Sensitivity of the mean ice resistance", ("sensitivity", )))))
+
+
+def parts(found, drawn):
+    """The chapters of CHAPTERS: [(heading, blocks)]."""
+    out, by_title = [], dict(found)
+    for heading, some in CHAPTERS:
+        blocks_of = []
+        for title, begins in some:
+            if title in by_title:
+                blocks_of += [{"kind": "heading", "text": title}] if title != heading else []
+                blocks_of += by_title[title]
+                blocks_of += [p for name, p in drawn.items() if name.startswith(begins)] if begins else []
+        out.append((heading, blocks_of))
+    return out
+
+
+def of_part(name, part):
+    """(heading, blocks) of a chapter of study/analysis.py."""
+    figure = part.get("figure")
+    drawn = report_run.picture(name, part["heading"], figure) if figure else None
+    return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
+
+
+#: what stands in place of a chapter that has not been made
+NOT_STUDIED = {
+    "converge": "Not studied: whether the result depends on width and length of the domain, time step, tolerance and "
+                "start is not known. bergtow converge CASE.yml examines it.",
+    "budget": "Not studied: how much the values that are assumed change the result is not known, and no interval of "
+              "this report covers it. bergtow budget STUDY.yml examines it.",
+}
+
+
+def doubt(name, found, folder, texts):
+    """Why what a command found is not of these members (texts: compared.cases of them), or no longer of the ensemble
+    in its folder; "" where it is."""
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    if name == "converge" and (at := compared.alone(found, texts)):
+        return f"studied at {at} alone: of the other tows of this report it says nothing"
+    try:
+        why = compared.stale(found, Members(folder)) if name == "budget" else ""
+    except RunError:  # the folder holds what was found alone
+        return ""
+    return f"out of date, {why}: call bergtow budget again" if why else ""
+
+
+def results_beside(e, also):
+    """{name: what a command of study/analysis.py left in the first of the folders that has it, with "doubt"}; folders:
+    that of the ensemble, and others."""
+    texts, out = compared.cases(e), {}
+    for name in analysis.KINDS:
+        for folder in (e.path, *also):
+            found = findings.read(name, folder)
+            if found is not None:
+                out[name] = found | {"doubt": doubt(name, found, folder, texts)}
+                break
+    return out
+
+
+def beside(results):
+    """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
+    out = []
+    for name, (heading, _) in analysis.KINDS.items():
+        if name in results:
+            out.append(of_part(name, analysis.chapter(name, results[name])))
+        elif name in NOT_STUDIED:
+            out.append((heading, [lines(NOT_STUDIED[name])]))
+    return out
+
+
+def first_runs(e, s):
+    """[(condition of the statistics, its values with their origin, the case as key: text, attributes)] of the first
+    member of each condition that can be read."""
+    out = []
+    for c, of in zip(s["conditions"], e.conditions()):
+        for m in of.members[e.status[of.members] == FINISHED]:
+            try:
+                with Run(e.folder(m)) as run:
+                    out.append((c, report_case.values(run), run.case, run.attributes))
+                break
+            except RunError:
+                continue
+    return out
+
+
+def varied(e, runs):
+    """Values of all conditions, those of first_runs(); of a parameter its range, of what else differs between
+    conditions, each value and each origin with its conditions."""
+    words = {"ice.seed": "varied"}
+    for key, some in e.parameters.items():
+        if len(set(some.tolist())) > 1:
+            factor, unit = reading(key, e.units[key])
+            words[key] = "varied" if some.dtype == object else \
+                f"varied, {factor * np.nanmin(some):.4g} to {factor * np.nanmax(some):.4g} {unit}".strip()
+    def together(some, text):
+        return "; ".join(loads_text.qualified(loads_text.shared([(c, text(v)) for (c, *_), v in zip(runs, some)])))
+    def of_all(some):
+        kinds = {v.kind for v in some}
+        return replace(some[0], value=words.get(some[0].key) or together(some, lambda v: report_case.short(v.value)),
+                       kind=some[0].kind if len(kinds) == 1 else "study",
+                       origin=together(some, lambda v: scrubbed(v.origin)))
+    return [of_all(some) for some in zip(*(values for _, values, *_ in runs))]
+
+
+def ranges(results):
+    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what
+    the program admits."""
+    out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
+    for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
+        out[key] = given["distribution"], given["source"] or "assumed"
+    return out
+
+
+def replays(e, place):
+    """[(words, path from the page)] of the replays that are there."""
+    some = [e.path / "replay.html", *sorted(e.path.glob("members/*/report.html"))]
+    return [(p.parent.name if p.name == "report.html" else "replay of one tow",
+             os.path.relpath(p, place.parent)) for p in some if p.is_file()]
+
+
+def context(folder, place=None, given=None, also=()):
+    """Everything that page/ensemble.html sets. place: where the page is to stand; given: {client, ...} in place of
+    those of the case; also: further folders with the results of other scripts. Errors: RunError."""
+    e, options = Members(folder), argparse.Namespace(**OPTIONS)
+    s = ensemble.statistics(e, options)
+    if s["holes"]:
+        print(f"bergtow report: warning: {s['holes']}", file=sys.stderr)
+    intro, found = sections(ensemble_text.report(s, markdown=True))
+    rows, rows_of = provenance(e), members(e, s)
+    runs = first_runs(e, s)
+    values = [replace(v, value=scrubbed(v.value)) for v in varied(e, runs)]
+    cases, results = statement.cases(e, s), results_beside(e, also)
+    counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
+    waiting = e.n - sum(counts.values())
+    block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
+    warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
+    return {
+        "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
+        "answer": answer(e, s, cases, results),
+        "tension": any(c["design"]["tension"] for c in s["conditions"]),
+        "warnings": [scrubbed(w) for w in warned],
+        "method": report_method.method(s, cases), "limits": report_method.limits(cases),
+        "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
+                    and not v.key.startswith(PERSONAL) and any(report_run.applies(v.key, r[2]) for r in runs)],
+        "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
+        "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
+        "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
+        "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
+        "replays": replays(e, place or e.path / "report.html"),
+        "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
+    }

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""How the numbers of a report came about, and what they cannot know: method, model and limits in words, each sentence
+from what was simulated."""
+import numpy as np
+
+from bergtow.result import compared
+from bergtow.result.origins import source_of_ice
+from bergtow.result.run import case_value
+from bergtow.stats import alike as stat_alike
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import profile as stat_profile
+from bergtow.table import number, quantity
+from bergtow.text import capability as capability_text
+from bergtow.text import loads as loads_text
+
+KAPPA, PRESSURE = "ice.rafting.kappa", "ice.crushing.pressure"
+
+
+def _span(values, text=lambda v: f"{v:.3g}"):
+    low, high = min(values), max(values)
+    return text(low) if low == high else f"{text(low)} to {text(high)}"
+
+
+def _fields(s, cases):
+    """Of which ice the tows are, "" where some read it."""
+    if any(source_of_ice(case.texts) for _, case in cases):
+        return ""
+    seeds = {m["seed"] for m in s["members"]}
+    return ", each through an ice field of its own" if len(seeds) == len(s["members"]) else \
+        f", whose ice is made from {len(seeds)} seeds, the same in all conditions"
+
+
+def _amount(s, cases):
+    """What was simulated, in a sentence."""
+    tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
+    n = sum(c["members"]["used"] for c in s["conditions"])
+    said = f"{n} tows in {len(s['conditions'])} conditions{_fields(s, cases)}"
+    if tows:
+        fields, hours = _span([d["fields"] for d in tows]), _span([d["hours"] for d in tows], number)
+        said += f"; {fields} fields and {hours} hours of tow a condition, the start-up left out"
+    return said + "."
+
+
+def method(s, cases):
+    """Paragraphs. cases: those of statement.cases()."""
+    out = [
+        "Every floe is a rigid polygon that moves in the plane of the sea surface. Floes, the towed body and walls "
+        "push each other by non-negative impulses with Coulomb friction, solved together in every time step (planar "
+        "non-smooth discrete element method, after Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138). Drag of water "
+        "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
+        "sum of these impulses over the time step. The tow force is the force along the tow: ice resistance, drag of "
+        "water and air, Coriolis force, slope of the sea and inertia. A force across the tow is not in it.",
+        _amount(s, cases)
+    ]
+    tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
+    if not tows:
+        return out
+    out.append(
+        f"{loads_text.asked(s)}. This is the level of the return time −T / ln(1 − p), "
+        f"{_span([d['return_hours'] for d in tows])} h: the level that is exceeded once in so long on average, all of "
+        "it towed in that condition. The load is first averaged by a moving mean over "
+        f"{_span([d['time_scale_s'] for d in tows])} s, so that pushes and collisions count by their impulse. "
+        "Excursions above a threshold are gathered into clusters, to whose maxima a generalised Pareto distribution "
+        "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
+        "95 % intervals come from the profile "
+        f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on; each condition "
+        "is fitted by itself, so their ends need not rise with the concentration. They hold for fields that are alike: "
+        f"a test at {100 * stat_alike.LEVEL:g} % of the maxima of blocks, by their ranks, warns of conditions whose "
+        "fields differ by more than chance. At least "
+        f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are required; otherwise there "
+        "is no value.")
+    if any(c["design"]["tension"] for c in s["conditions"]):
+        out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is "
+                   "stated.")
+    return out
+
+
+def _span_of(cases, key):
+    """"10", or "5 to 17": the values above zero that a key has in these cases."""
+    values = {case_value(case.texts, key, 0.0): case.texts.get(key, "") for _, case in cases}
+    return _span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
+
+
+def _ice(case, kappa, pressure):
+    """What floes do; kappa, pressure: of all cases, so that those of another value are no other sentence."""
+    if case.rigid:
+        return ("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
+                + (", and here they are dense enough to jam." if case.jams else "."))
+    rafts, crushes = (case_value(case.texts, key, 0.0) > 0 for key in (KAPPA, PRESSURE))
+    ways = [*["they slide over each other (raft) above a load that grows with the square of their thickness, κ = "
+              f"{kappa}"] * rafts, *[f"their edges crush at {pressure}"] * crushes]
+    never = ["break", "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)]
+    return f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never[:-1])} or {never[-1]}."
+
+
+def _pack(case):
+    return "" if case.texts.get("domain.ends") != "open" or case.texts.get("domain.sides") == "wall" else \
+        "The ice is not confined along the tow: pressure in the pack by wind, current or a shore is not in the force."
+
+
+def _end(case):
+    """What the towing end does."""
+    return {
+        "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
+                 "the tow force holds no dynamics of the line.",
+        "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
+        "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
+    }.get(case.mode, "Nothing is towed.")
+
+
+def _line(case):
+    return "" if case.mode == "speed" or np.isfinite(case.breaking_load) else \
+        "No line parts: the case sets no breaking load."
+
+
+def _vessel(case):
+    return "" if np.isfinite(case.bollard_pull) else "No vessel is judged: the case names no bollard pull."
+
+
+def limits(cases):
+    """Sentences on what the model leaves out, the gravest first; what is not so of all cases, with its conditions.
+    cases: those of statement.cases()."""
+    out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
+           "forces were not validated."]
+    if not cases:
+        return out
+    def of_each(say):
+        for text, where in loads_text.shared([(c, say(case)) for c, case in cases]):
+            yield f"For {where}: {text[0].lower()}{text[1:]}" if where else text
+    kappa, pressure = (_span_of(cases, key) for key in (KAPPA, PRESSURE))
+    out += of_each(lambda case: _ice(case, kappa, pressure))
+    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
+               "there are no waves.")
+    for say in (_pack, _end, _line, _vessel):
+        out += of_each(say)
+    out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
+               "design tow force do not depend on it.")
+    out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
+               "in level, return levels and the design value are borne by fields worse than any simulated, and lie "
+               "above the interval more often than it says. The intervals cover neither the values that are assumed "
+               "nor the choice of the model, and there is no safety factor in any number.")
+    return out
+
+
+def _breaking(case):
+    if np.isfinite(case.breaking_load):
+        return case.breaking_words
+    return "none in the case: the tension above has no safety factor" if case.mode != "speed" else \
+        "no line in the case: the tow force above is without dynamics of a line and without a safety factor"
+
+
+def _pull(case):
+    return quantity(case.bollard_pull, "N") if np.isfinite(case.bollard_pull) else \
+        "no vessel in the case: its net pull at the speed of the tow, after its own resistance in ice, must exceed " \
+        "the tow force"
+
+
+def holds(cases):
+    """Rows (what, value) on the line and the vessel, for the answer; cases: those of statement.cases()."""
+    if not cases:
+        return []
+    def row(what, say):
+        return what, "; ".join(loads_text.qualified(loads_text.shared([(c, say(case)) for c, case in cases])))
+    made = [(c["label"], c["design"]["speed"]) for c, case in cases
+            if c["design"]["speed"] and case.mode in ("line", "thrust")]
+    said = [f"{label}: {number(v['value'])} m/s" + (
+        f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})" if np.isfinite(v["interval_95"]).all()
+        else "") for label, v in made]
+    return [row("tow speed asked for", lambda case: case.texts.get("tow.speed", "–")),
+            *[("speed made good", "; ".join(said))] * bool(said),
+            row("breaking load of the line", _breaking), row("bollard pull of the vessel", _pull)]
+
+
+def _limit(found, c):
+    """Where the limit of a condition lies, with what keeps it from being resolved."""
+    ends = [capability_text.value(found, c[k]) for k in ("makes_it", "does_not") if c[k] is not None]
+    if c["resolved"] and len(ends) < 2:
+        return c["why"]
+    at = f"about {capability_text.value(found, c['estimate'])}" if c["estimate"] is not None else \
+        f"between {' and '.join(ends)}" if len(ends) == 2 else "not found"
+    return at if c["resolved"] else f"{at}; not resolved: {c['why']}"
+
+
+def _capability(found):
+    """(what, value) of a capability.json, a row a condition."""
+    key = found["search"].rpartition(".")[2].replace("_", " ")
+    for c in found["conditions"]:
+        at = _limit(found, c) + (f" ({found['doubt']})" if found.get("doubt") else "")
+        name = "" if not found["for"] else f", {capability_text.condition(found, c)}"
+        yield (f"{key} at which half of the tows no longer keep {number(found['speed'])} m/s{name}"
+               if found["share"] == 0.5 else
+               f"{key} at which {100 * (1 - found['share']):g} % of the tows no longer keep "
+               f"{number(found['speed'])} m/s{name}", at)
+
+
+def _convergence(found, e):
+    """What converge.json says in one line of the values that the case has: what matters, what does not, what stayed
+    open, what was compared at another value alone. A quantity has one verdict: of 2 s against 1 s, if 2 s is the time
+    step of the case, and not that of 1 s against 0.5 s as well."""
+    texts = compared.cases(e)
+    if why := compared.misfit(found, texts):
+        return f"studied for another case: {why}"
+    verdicts = compared.verdicts(found["rows"], compared.values(e, texts))
+    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
+             ("elsewhere", "not compared at the value of these tows:"))
+    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
+    at = compared.alone(found, texts)
+    return "; ".join([f"{said} {', '.join(names)}" for said, names in some if names] +
+                     [f"studied at {at} alone"] * bool(at)) or "nothing compared"
+
+
+def beyond(results, e):
+    """Rows (what, value) of what other commands found, for the answer: {name: found}. e: Ensemble."""
+    budget, converge = results.get("budget"), results.get("converge")
+    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
+             "draft were not varied beyond the conditions above" if budget is None else "; ".join(
+        f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
+        for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
+    if budget is not None and budget.get("doubt"):
+        rows[0] = rows[0][0], f"{rows[0][1]} ({budget['doubt']})"
+    rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
+                 else _convergence(converge, e)))
+    return rows + list(_capability(results["capability"]) if "capability" in results else [])

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""The report of a run, or of an ensemble, as one HTML page that needs nothing else: numbers, pictures, replay of the
+ice field, provenance.
+
+The page loads nothing: styles, script, pictures and data stand in it, and its content security policy forbids all else,
+so that it can be mailed, archived and opened offline. Text from case files is escaped by the template engine.
+"""
+import base64
+import hashlib
+from datetime import datetime, timezone
+from pathlib import Path
+
+from bergtow import arguments, writing
+from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.plot import vector
+from bergtow.reporting import pdf
+from bergtow.reporting import run as report_run
+from bergtow.reporting.replay import LIMIT
+from bergtow.result.origins import TITLE_BLOCK
+from bergtow.result.run import Run
+from bergtow.study import analysis
+
+import jinja2
+
+PAGE = Path(__file__).resolve().parent / "page"
+MOST_OF_TITLE = 80  #: letters in the running head
+
+
+def templates():
+    """The template engine; a name that is missing in the context is an error, not an empty text."""
+    return jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE),
+                              autoescape=True,
+                              undefined=jinja2.StrictUndefined,
+                              trim_blocks=True,
+                              lstrip_blocks=True)
+
+
+def script():
+    """The replay's script, as one function."""
+    parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "replay_controls.js")]
+    return "(() => {\n" + "\n".join(parts) + "})();\n"
+
+
+def policy(code):
+    """Content security policy: no network at all, the one script by its hash."""
+    digest = base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")
+    return (f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
+            "base-uri 'none'; form-action 'none'")
+
+
+def quoted(text):
+    """A string of CSS: what is no plain letter is written by its number, so that it ends neither string nor style."""
+    return '"' + "".join(c if c.isalnum() and c.isascii() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
+
+
+def head_of_pages(title, revision):
+    """The running head and foot of the printed page."""
+    left = title if len(title) <= MOST_OF_TITLE else title[:MOST_OF_TITLE - 1].rstrip() + "…"
+    right = f"revision {revision}" if revision not in ("", "–") else ""
+    box = 'font: 7.6pt "DejaVu Sans", Verdana, sans-serif; color: #5a6672; vertical-align: bottom; padding-bottom: 4mm;'
+    foot = box.replace("bottom; padding-bottom", "top; padding-top")
+    return (f"@page {{ @top-left {{ content: {quoted(left)}; width: 75%; text-align: left; {box} }}\n"
+            f"@top-right {{ content: {quoted(right)}; text-align: right; {box} }}\n"
+            f'@bottom-left {{ content: "bergtow"; text-align: left; {foot} }}\n'
+            f'@bottom-right {{ content: counter(page) " of " counter(pages); text-align: right; {foot} }} }}\n')
+
+
+def css(title, revision):
+    light, dark = vector.styles()
+    return "\n".join([(PAGE / "report.css").read_text(encoding="utf-8"), f":root {{ {light} }}",
+                      f"@media (prefers-color-scheme: dark) {{ @media not print {{ :root {{ {dark} }} }} }}",
+                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, revision)])
+
+
+def render(template, context, paper=False):
+    """The page as text; paper: for a PDF."""
+    code = script() if "replay" in context and not paper else ""
+    return templates().get_template(template).render(**context,
+                                                     code=code,
+                                                     paper=paper,
+                                                     mark=writing.MARK,
+                                                     policy=policy(code),
+                                                     css=css(context["title"], context["revision"]),
+                                                     made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
+
+
+def options(p):
+    arguments.add_run(p, "report.html")
+    p.add_argument(
+        "--size",
+        metavar="MB",
+        type=float,
+        default=LIMIT / 1e6,
+        help=
+        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so "
+        "(default: %(default)g)"
+    )
+    p.add_argument("--no-compression",
+                   action="store_true",
+                   help="store the replay's data as they are, for browsers that cannot unpack them")
+    for name in TITLE_BLOCK:
+        p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block, in place of report.{name} of the "
+                       "case")
+    p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
+                   help="of an ensemble: take results of converge and other commands from this folder too; may be "
+                   "repeated")
+
+
+def perform(a):
+    if not 0.1 <= a.size <= 1000:
+        raise BergtowError("--size: choose 0.1 to 1000 MB", USAGE)
+    path = arguments.output(a, "report.html", (".html", ".htm", ".pdf"))
+    write(Path(a.run), [path], {name: getattr(a, name) for name in TITLE_BLOCK}, a.also, a.size, not a.no_compression,
+          a.force)
+
+
+def pages(folder, paths, given, also, size, compressed):
+    """{path: text} of the report of a folder, as HTML or, for a PDF, as that which is printed. Errors: RunError."""
+    # the second alone: it has only just begun
+    if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
+        from bergtow.reporting import ensemble as report_ensemble  # not for a run: it loads the statistics
+        analysis.also(also)
+        template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, also)
+    else:
+        if also:
+            raise RunError(folder, "is a run, and --also is of an ensemble", "leave --also out")
+        with Run(folder) as run:
+            if not len(run["time"]):
+                raise RunError(folder, "has made no step to report on", "go on with it: bergtow resume")
+            template, context = "run.html", report_run.context(run, 1e6 * size, compressed, given)
+    return {path: render(template, context, path.suffix.lower() == ".pdf") for path in paths}
+
+
+def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True, force=False):
+    """The report of a folder in one or more files. given: {name: text or None} of the title block; also: folders of
+    analyses; size: MB of the replay's data. Errors: RunError."""
+    given = dict.fromkeys(TITLE_BLOCK) | (given or {})
+    for path, text in pages(folder, paths, given, also, size, compressed).items():
+        if path.suffix.lower() == ".pdf":
+            pdf.write(text, path, force)
+        else:
+            writing.write_text(text, path, force)
+        print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""The command statistics: the tables of an ensemble, printed; statistics.csv (a row a condition) and statistics.json
+(everything) go into its folder.
+
+Where members of the study are in no number (they wait, failed, are not sound, or have no mean), all is written, they
+are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
+"""
+from pathlib import Path
+
+from bergtow import arguments, writing
+from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero
+from bergtow.errors import RunError
+from bergtow.result.members import EXCLUDABLE, FINISHED, Members
+from bergtow.stats import conditions, loads
+from bergtow.stats import fit as stat_fit
+from bergtow.text import ensemble as ensemble_text
+
+import numpy as np
+
+
+def load_columns(c, names):
+    """Columns of the loads; the unit ends their names, as in summary.json."""
+    out = {}
+    for name, units in names.items():
+        x = c["loads"].get(name)
+        def column(what, value, name=name, units=units):
+            out[f"{name}_{what}_{units.lower()}"] = value
+        column("mean", x and x["mean"]["value"])
+        for k, end in enumerate(("low", "high")):
+            column(f"mean_{end}", x and x["mean"]["interval_95"][k])
+        column("sd", x and x["sd"]["value"])
+        column("p99", x and x["quantiles"]["99"]["value"])
+        column("largest", x and x["largest"])
+        column("start_up", x and x["start_up"] and x["start_up"]["largest"])
+        column("design", x and x["design"].get("value"))
+        for k, end in enumerate(("low", "high")):
+            column(f"design_{end}", x and x["design"].get("interval_95", (None, None))[k])
+        out[f"{name}_time_scale_s"] = x and x["time_scale_s"]
+    return out
+
+
+def csv_row(c, load_names):
+    """Flat columns of a condition; forces in N."""
+    r = c["resistance"]
+    row = {
+        "condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
+        **{k: c["members"][k]
+           for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
+                                                           for k, n in c["members"]["doubts"].items()}
+    }
+    w = c["without_bound"]
+    row |= {"at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
+    for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
+                "largest_share", "fields_needed"):
+        row[key] = r.get(key)
+    for key in ("t_95", "bootstrap_95", "median_95"):
+        row[f"{key}_low"], row[f"{key}_high"] = r.get(key, (None, None))
+    for name, estimate in c["estimates"].items():
+        row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
+        if not estimate["on_top"]:
+            row[f"simulated_over_{name}"] = estimate["ratio"]
+    row |= load_columns(c, load_names)
+    return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
+
+
+def write(s, folder, force):
+    """statistics.json and statistics.csv in the folder. Errors: RunError."""
+    names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
+    writing.write_json(s, folder / "statistics.json", force)
+    writing.write_csv([csv_row(c, names) for c in s["conditions"]], folder / "statistics.csv", force)
+
+
+def options(p):
+    p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
+    p.add_argument("-o",
+                   "--output",
+                   metavar="FOLDER",
+                   type=Path,
+                   help="where to write statistics.csv and .json (default: DIR)")
+    p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
+    p.add_argument("--error",
+                   type=above_zero,
+                   default=0.05,
+                   metavar="E",
+                   help="relative error of the mean that the number of fields needed is for (default 0.05)")
+    p.add_argument("--exclude",
+                   action="append",
+                   choices=EXCLUDABLE,
+                   default=[],
+                   help="leave out members with this doubt, and name them; may be repeated")
+    p.add_argument("--hours",
+                   type=above_zero,
+                   nargs="+",
+                   default=[1.0, 10.0, 100.0],
+                   metavar="T",
+                   help="return times of loads and peaks, hours of tow (default 1 10 100)")
+    loads.add_load_options(p)
+    p.add_argument("--threshold",
+                   type=finite,
+                   metavar="N",
+                   help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
+    p.add_argument("--gap",
+                   type=not_below_zero,
+                   metavar="S",
+                   help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
+    p.add_argument("--blocks",
+                   type=at_least_one,
+                   metavar="K",
+                   help="blocks a field for block maxima (default: so many that there are 20)")
+    p.add_argument("--resamples",
+                   type=at_least_one,
+                   default=stat_fit.RESAMPLES,
+                   metavar="B",
+                   help="resamples for p-values and return levels (default %(default)s)")
+    p.add_argument("--partial",
+                   action="store_true",
+                   help="exit with 0 even where members of the study are in no number")
+    arguments.add_force(p)
+
+
+def perform(a):
+    e = Members(a.folder)
+    folder = a.output or e.path
+    for name in ("statistics.json", "statistics.csv"):
+        writing.may_write(folder / name, a.force)
+    s = conditions.statistics(e, a)
+    write(s, folder, a.force)
+    print(ensemble_text.report(s, a.markdown))
+    print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
+    if s["holes"] and not a.partial:
+        again = "" if np.all(e.status == FINISHED) else "run `bergtow ensemble` again, with --retry-failed for those " \
+            "that failed, or "
+        raise RunError(e.path, s["holes"], f"{again}take what there is with --partial")

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""What converge.json says of another study: of the value of each quantity that this study itself runs with, and not of
+any other that was tried.
+
+A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
+So what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
+"""
+import hashlib
+
+import numpy as np
+
+from bergtow.errors import RunError
+from bergtow.result.members import FINISHED
+from bergtow.result.run import Run, case_value
+
+#: {quantity of bergtow converge: the key that is its value}
+KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",
+        "tolerance": "solver.tolerance", "window": "output.window_start"}
+WINDOW = 0.01  # of its length: ends of a window fall on steps
+#: what makes another case of it; not where the domain lies, which goes with its size
+PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "lead.", "domain.ends", "domain.sides", "domain.wall_")
+PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "ice.extent.x_min",
+          "ice.extent.x_max", "ice.extent.y_min", "ice.extent.y_max", "body.x", "body.y", "tow.ramp")
+
+
+def cases(e):
+    """[{key: text}] of the members of an ensemble that can be read."""
+    out = []
+    for m in e.used:
+        try:
+            with Run(e.folder(m)) as run:
+                out.append(run.case)
+        except RunError:
+            continue
+    return out
+
+
+def _one(values, slack):
+    """The value that all have, None where they differ, or none is known."""
+    values = np.array(values, dtype=float)
+    if not len(values) or not np.isfinite(values).all() or np.ptp(values) > slack * np.abs(values).max():
+        return None
+    return float(values[0])
+
+
+def values(e, texts):
+    """{quantity: the value that all members have, None where they differ or it is not known}; of the window its two
+    ends, s, or None. texts: those of cases()."""
+    out = {name: _one([case_value(text, key) for text in texts], 1e-9) for name, key in KEYS.items()}
+    ends = [_one([e.number(f"window_{end}_s", m) for m in e.used], WINDOW) for end in ("start", "end")]
+    return out | {"window": None if None in ends else tuple(ends)}
+
+
+def _begins(row, value):
+    """Does the row compare this value with the next?"""
+    at = row.get("from")
+    if at is None or value is None:
+        return False
+    if row["name"] != "window":
+        return bool(np.isclose(at, value, rtol=1e-6, atol=0))
+    start, end = value  # `to` is the middle
+    return abs(at - start) <= WINDOW * (end - start) and abs(row["to"] - (start + end) / 2) <= WINDOW * (end - start)
+
+
+def chain(rows, name, value):
+    """Rows of a quantity from this value on, [] where no row begins there. A row without values, where nothing could be
+    compared, speaks of the case whatever its value."""
+    some = [row for row in rows if row["name"] == name]
+    begin = next((k for k, row in enumerate(some) if _begins(row, value)), len(some))
+    return some[begin:] or [row for row in some if "from" not in row]
+
+
+def verdicts(rows, own):
+    """{quantity that was compared: "matters", "none" or "open" at the study's own value, "elsewhere" where that was not
+    compared}."""
+    out = {}
+    for name in dict.fromkeys(row["name"] for row in rows if row["name"] in KEYS):
+        found = chain(rows, name, own.get(name))
+        out[name] = found[0]["judged"] if found else "elsewhere"
+    return out
+
+
+def _differ(a, b):
+    """Are two values of a key different? Of files the names count, since folders move."""
+    x, y = (case_value({"": text}, "") for text in (a, b))
+    if np.isfinite([x, y]).all():
+        return not np.isclose(x, y, rtol=1e-9, atol=1e-12)
+    return a.rpartition("/")[2] != b.rpartition("/")[2]
+
+
+def unlike(a, b, but=()):
+    """(key, its text in a, in b) of what makes another case of b: keys that both have, `but` these. Where neither has a
+    lead, its extent, which follows from the tow, makes none."""
+    physical = PHYSICAL
+    if a.get("lead.mode") == b.get("lead.mode") == "none":
+        physical = tuple(key for key in PHYSICAL if key != "lead.")
+    for key, value in a.items():
+        if (key.startswith(physical) or key == "run.dt") and key not in (*PLACES, *but) and key in b \
+                and _differ(value, b[key]):
+            yield key, value, b[key]
+
+
+def common(texts):
+    """{key: text} of what all these cases have alike."""
+    return {k: v for k, v in (texts[0] if texts else {}).items() if all(t.get(k) == v for t in texts)}
+
+
+def state(e):
+    """Of which study, and of how many members that had finished: {"study", "finished"}."""
+    return {"study": hashlib.sha256(e.study.encode()).hexdigest(), "finished": int(np.sum(e.status == FINISHED))}
+
+
+def stale(found, e):
+    """Why what was found by state(e) is not that of this ensemble any more, "" where it is, or does not say."""
+    now = state(e)
+    if found.get("study", now["study"]) != now["study"]:
+        return "of another study than its folder holds"
+    then = found.get("finished", now["finished"])
+    return "" if then == now["finished"] else f"of {then} members, while {now['finished']} have finished"
+
+
+def _beside(found, texts):
+    """(key, its text in what was found, those of the members' cases) of what makes another case."""
+    for key, value in (found.get("values") or {}).items():
+        some = list(dict.fromkeys(text[key] for text in texts if key in text))
+        if some and key.startswith(PHYSICAL) and key not in PLACES:
+            yield key, value, some
+
+
+def _among(value, some):
+    """Is a value one of these, or between the least and the largest of numbers?"""
+    numbers = np.array([case_value({"": text}, "") for text in some])
+    x = case_value({"": value}, "")
+    between = np.isfinite([x, *numbers]).all() and numbers.min() <= x <= numbers.max()
+    return between or not all(_differ(value, text) for text in some)
+
+
+def misfit(found, texts):
+    """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say
+    of which it is: a key of the ice, the body, the tow, water or air is not as in any of them."""
+    for key, value, some in _beside(found, texts):
+        if not _among(value, some):
+            return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
+    return ""
+
+
+def alone(found, texts):
+    """Of which of several values of the members what was found speaks: "ice.concentration 0.8", "" where they have no
+    other."""
+    return ", ".join(f"{key} {value}" for key, value, some in _beside(found, texts)
+                     if any(_differ(value, text) for text in some))

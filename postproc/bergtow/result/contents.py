@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""List what the output folder of a run holds: counts, summary, series with units."""
+
+from bergtow.result.run import Run
+
+
+def entries(group, prefix=""):
+    """(dotted name, text) of everything in nested groups; the curves of the estimates are left out."""
+    for key, value in group.items():
+        if isinstance(value, dict):
+            if key != "curves":
+                yield from entries(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def options(p):
+    p.add_argument("run", metavar="RUN", help="output folder of a run")
+
+
+def perform(a):
+    with Run(a.run) as run:
+        print(f"{run.path}: {run.n_floes} floes, {len(run.bodies)} bodies, {len(run['time'])} samples, "
+              f"{run.n_frames} frames")
+        for name, item in entries(run.summary):
+            print(f"  {name:40} {item}")
+        print("series:")
+        for name in run.series_names:
+            print(f"  {name:24} {run.units(name):8} {run.description(name)}")

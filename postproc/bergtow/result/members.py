@@ -1,0 +1,466 @@
+# SPDX-License-Identifier: MIT
+"""Read the folder of an ensemble: its members, what was varied, their summaries, series, collisions and doubts.
+
+    e = Members("out/concentration")
+    for c in e.conditions():                       # members of one combination of values
+        print(c.label, e.mean[c.finished])
+    time, ice = e.series(m)                        # of member m, all of its run
+    e.doubts(m)                                    # {"unconverged", "jammed", ...}
+
+ensemble.h5 holds all but collisions and most series; those are in the members' folders. It is read only
+under a sound seal, and a member whose files do not fit the record of its end (result/integrity.py) counts as waiting:
+it is in no number until `bergtow ensemble` has run it again. Errors: RunError.
+"""
+import json
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from bergtow import _library
+from bergtow.errors import BergtowError, RunError
+from bergtow.result import at_least, integrity
+from bergtow.result.hdf5 import opened, plain
+from bergtow.result.run import Run, least, within
+
+WAITING, FINISHED, FAILED = 0, 1, 2
+#: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean, since
+#: what comes shortly before that is the largest of all
+LEAST_TOW = 150.0
+
+#: kinds of doubt about a member, and what each means
+DOUBTS = {
+    "unconverged": "steps met the limit of work before the tolerance",
+    "unbounded": "the load of the body has no bound in some steps of its window: its means and peaks are lower bounds",
+    "jammed": "the towed body stood still while the tow asked for motion",
+    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
+                "solved",
+    "short": "no window, or fewer than 20 independent samples in it",
+    "few": "the body met no ice in its window, or little: contact worth fewer than 10 equal stretches",
+    "stopped": "the run stopped early",
+    "other": "a warning of another kind",
+}
+
+#: codes of warnings that tell of one of these; what a verdict rests on are reasons, and no warnings of their own
+TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
+
+#: doubts by which members may be left out: not that they met little ice, which would leave out the small means
+EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One combination of the values that were varied."""
+
+    index: int            #: from 0
+    values: dict          #: {key: number or text}
+    units: dict           #: {key: unit}
+    members: np.ndarray   #: rows of all its members
+    finished: np.ndarray  #: rows of those that finished with a mean and are not excluded
+    failed: int
+    waiting: int
+    excluded: int
+
+    @property
+    def label(self):
+        return ", ".join(worded(key, value, self.units[key]) for key, value in self.values.items()) or "the case"
+
+
+def reading(key, unit):
+    """(factor, unit) in which a key reads: a concentration in %, an angle in degrees; unit "" for a plain number."""
+    if key == "ice.concentration":
+        return 100.0, "%"
+    if unit in ("rad", "rad/s"):
+        return 180.0 / np.pi, unit.replace("rad", "deg")
+    return 1.0, "" if unit == "1" else unit
+
+
+def worded(key, value, unit, digits=4):
+    """"concentration 60 %", "ice size 30 m": a value that was varied; unit: that of the value, "1" or "" for none."""
+    if isinstance(value, str):
+        return f"{short_key(key)} {value}"
+    factor, unit = reading(key, unit)
+    return f"{short_key(key)} {factor * value:.{digits}g} {unit}".rstrip()
+
+
+def short_key(key):
+    """Last part of a case key, in words: ice.friction is "ice friction", ice.concentration "concentration"."""
+    section, _, name = key.rpartition(".")
+    plain = name.replace("_", " ")
+    return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
+
+
+@dataclass(frozen=True)
+class WithoutBound:
+    """Tows of a condition in which nothing bounds the load in some steps, and those that ended for it."""
+
+    share: float    #: mean over the tows that finished of the share of such steps in their windows
+    some: list      #: names of those that hold such steps
+    ended: list     #: names of those that guard.no_solution ended, which are in no number
+    tows: int       #: of both kinds, and of all others
+
+    def __bool__(self):
+        return bool(self.some or self.ended)
+
+    def __str__(self):
+        return self.words()
+
+    def words(self, named=False):
+        """How many they are, and what share of the steps; named: with their names."""
+        some, ended = (f" ({listed(names)})" if named else "" for names in (self.some, self.ended))
+        parts = [f"the load of the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
+                 f"{100 * self.share:.2g} % of the steps of all that finished"] * bool(self.some)
+        parts += [f"{len(self.ended)} of {self.tows} tows ended for want of a solution (guard.no_solution) and are in "
+                  f"no number{ended}"] * bool(self.ended)
+        return "; ".join(parts)
+
+
+def _rows(f, group, columns):
+    """Rows of a table of ensemble.h5; a table without rows is not there."""
+    if group not in f:
+        return zip()
+    return zip(*(d.asstr()[()] if h5py.check_string_dtype(d.dtype) else d[()]
+                 for d in (f[f"{group}/{column}"] for column in columns.split())))
+
+
+def listed(names, most=8):
+    """Names in a row, the first of many."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+class Members:
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason,
+    hole: [M]; unsound: {name: why}."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.file = self.path / "ensemble.h5"
+        if not self.path.is_dir():
+            raise RunError(self.path, "no such folder", "give the folder that `bergtow ensemble -o` wrote")
+        if not self.file.exists():
+            raise RunError(self.path, "holds no ensemble.h5",
+                           "give the folder that `bergtow ensemble -o` wrote, or run it again")
+        try:
+            self._read()
+            self.unsound = self._unsound()
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})",
+                           "run `bergtow ensemble` again: it makes the file anew") from None
+        self._dropped = {}
+
+    def _read(self):
+        try:
+            integrity.check_seal(self.file, "ensemble")
+        except BergtowError as error:
+            why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
+            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file anew") from None
+        with opened(self.file, "run `bergtow ensemble` again: it makes the file anew") as f:
+            self.attributes = dict(f.attrs)
+            for key in ("id", "condition", "repeat", "seed", "status"):
+                setattr(self, key, f[f"members/{key}"][()])
+            self.name, self.reason, self.hole = (list(f[f"members/{key}"].asstr()[()])
+                                                 for key in ("name", "reason", "hole"))
+            self._warnings, self._reasons = (self._notes(f, group) for group in ("warnings", "reasons"))
+            self._meanings = dict(zip(*(f[f"codes/{key}"].asstr()[()] for key in ("code", "meaning"))))
+            self._events = defaultdict(list)
+            for member, time, kind, subject, value in _rows(f, "events", "member time kind subject value"):
+                self._events[int(member) - 1].append(
+                    {"time_s": float(time), "kind": str(kind), "subject": int(subject), "value": float(value)})
+            self.parameters, self.units, self.assumed = {}, {}, {}
+            for key, data in f["parameters"].items():
+                self.assumed[key] = {word: plain(data.attrs.get(word, b"")) for word in ("distribution", "source")}
+                self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
+                self.units[key] = plain(data.attrs.get("units", "1"))
+            self.state = list(f["members/state_hash"].asstr()[()])
+            self.summary = {key: data[()] for key, data in f["summary"].items()}
+            self.meaning = {
+                key: {k: plain(v) for k, v in data.attrs.items()} for key, data in f["summary"].items()
+            }
+            self._series = {key: data[()] for key, data in f["series"].items()}
+            self._described = {
+                key: [plain(data.attrs.get(what, "")) for what in ("label", "units", "description")]
+                for key, data in f["series"].items()
+            }
+            self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
+        self.study = plain(self.study)
+        self.n = len(self.name)
+        self.title = plain(self.attributes.get("title", b"")) or self.path.resolve().name
+
+    @staticmethod
+    def _notes(f, group):
+        """{row of the member: its warnings or reasons, as Run.warnings has them}"""
+        out = defaultdict(list)
+        for member, code, text, values in _rows(f, group, "member code text values"):
+            out[int(member) - 1].append({"code": code, "text": text, "values": json.loads(values) or {}})
+        return out
+
+    def _unsound(self):
+        """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
+        out = {
+            self.name[m]: self.reason[m].strip()
+            for m in np.flatnonzero(self.status == WAITING)
+            if self.hole[m] in ("unsound", "unreadable")
+        }
+        for m in np.flatnonzero(self.status == FINISHED):
+            why = integrity.fault_of_member(self.folder(m), self.name[m],
+                                            self.study.encode()) if self.folder(m).is_dir() else None
+            if why:
+                out[self.name[m]] = why
+                self.status[m], self.reason[m], self.hole[m] = WAITING, f"its result is not sound: {why}", "unsound"
+        return out
+
+    def number(self, key, m):
+        """A number of a member's summary, NaN where there is none."""
+        return float(self.summary[key][m]) if key in self.summary else np.nan
+
+    @cached_property
+    def estimates(self):
+        """{name: {"label", "on_top"}} of the estimates in the members' summaries, in the order of the program's
+        registry."""
+        forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
+        out = {}
+        for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
+            meaning = self.meaning[key]
+            out[meaning["estimate"]] = {"label": meaning["label"], "on_top": meaning["kind"] == "on top"}
+        return out
+
+    @property
+    def complete(self):
+        return bool(np.all(self.status != WAITING))
+
+    @cached_property
+    def sampled(self):
+        """True for a Latin hypercube, False for a grid."""
+        return "sampling: latin-hypercube" in self.study.split("# base case")[0]
+
+    # ---- members
+
+    def folder(self, m):
+        return self.path / "members" / self.name[m]
+
+    def has(self, name):
+        """Does ensemble.h5 hold this series of the members?"""
+        return name in self._series
+
+    def described(self, name):
+        """(label, units, description) of a series."""
+        label, *rest = self._described[name]
+        return (label or name.replace("_", " "), *rest)
+
+    def series(self, m, name="ice_resistance"):
+        """(time s, values) of a series over a member's whole run; of steps without a load by result/run.py: least."""
+        time, x = (self._series[key][m] for key in ("time", name))
+        there = np.isfinite(time)
+        x = x[there]
+        return time[there], least(x) if self.number("no_load_steps", m) > 0 else x
+
+    def steady(self, m):
+        """Ice resistance over the window of a member's tow, N; empty where there is none."""
+        time, ice = self.series(m)
+        start, end = self.window(m, time)
+        return ice[within(time, start, end)] if np.isfinite([start, end]).all() else np.zeros(0)
+
+    # ---- the tow
+
+    def adrift(self, m):
+        """From when on nothing tows the body of a member, s; inf where something does to the end."""
+        return min((v["time_s"] for v in self.events(m) if v["kind"] == "adrift"), default=np.inf)
+
+    def cut(self, m):
+        """Does a member's tow end within the window that its summary names, or before it? Numbers of the summary over
+        the window are then not those of a tow."""
+        return self.adrift(m) < self.number("window_end_s", m)
+
+    def window(self, m, time):
+        """(start, end) of that window as long as something tows the body, s, for samples that end at `time`: the end of
+        the first that holds no step before it, and of the last; NaN where the summary names none."""
+        start, end, dt = (self.number(key, m) for key in ("window_start_s", "window_end_s", "dt_s"))
+        late = np.median(np.diff(time)) - dt if len(time) > 1 and np.isfinite(dt) else 0.0
+        return start + late, min(end, self.adrift(m))
+
+    def scaling(self, m):
+        """Time at full scale / time of a member: the root of its length scale."""
+        scale = self.number("estimates_length_scale", m)
+        return float(np.sqrt(scale)) if scale > 0 else 1.0
+
+    @cached_property
+    def mean(self):
+        """Mean ice resistance of each member's tow in its window [M], N; NaN where it has none."""
+        out = np.array(self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan)), dtype=float)
+        for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(out)):
+            if self.cut(m):
+                long = self.adrift(m) - self.number("window_start_s", m) >= LEAST_TOW / self.scaling(m)
+                x = self.steady(m) if long else []
+                out[m] = np.mean(x) if len(x) else np.nan
+        return out
+
+    def warnings(self, m):
+        """[{"code", "text", "values"}] of a member: codes and values for programs, texts for readers."""
+        return self._warnings[int(m)]
+
+    def why_unsteady(self, m):
+        """What the first reason that a member gives for its verdict stands for: the same words for the same code."""
+        codes = [reason["code"] for reason in self._reasons[int(m)]]
+        return self._meanings.get(codes[0], codes[0]) if codes else "its result does not say why"
+
+    def events(self, m):
+        """What happened in a member's run, as Run.events has it."""
+        return self._events[int(m)]
+
+    @cached_property
+    def _doubts(self):
+        verdicts, independent_least, stretches_least = (_library.limit(name) for name in (
+            "verdicts", "window_independent", "window_contact_stretches"))
+        out = {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            codes = {warning["code"] for warning in self.warnings(m)}
+            verdict, independent = (self.number(key, m) for key in ("window_verdict", "window_n_independent"))
+            short = verdict == verdicts.index("too short") or (np.isnan(verdict)
+                                                                and not independent >= independent_least)
+            few = self.number("window_n_contact_stretches", m) < stretches_least
+            checks = {
+                "unconverged": self.number("unconverged_steps", m) > 0,
+                "unbounded": self.number("window_no_load_share", m) > 0,
+                "jammed": self.number("stalled_windows", m) > 0,
+                "unsteady": verdict == verdicts.index("not steady"), "short": short and not few, "few": few,
+                "stopped": "stopped" in codes, "other": bool(codes - TOLD)
+            }
+            out[int(m)] = {kind for kind, there in checks.items() if there}
+        return out
+
+    def doubts(self, m):
+        """Kinds of doubt (keys of DOUBTS) about a finished member."""
+        return self._doubts.get(int(m), set())
+
+    @cached_property
+    def behind(self):
+        """Members that have finished since ensemble.h5 was made."""
+        return [
+            self.name[m]
+            for m in np.flatnonzero(self.status == WAITING)
+            if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()
+        ]
+
+    def reasons(self, status):
+        """{name: why} of the members that failed, or of the waiting ones whose process died."""
+        return {
+            self.name[m]: self.reason[m].strip() or "no reason recorded"
+            for m in np.flatnonzero(self.status == status)
+            if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound
+        }
+
+    @cached_property
+    def without_folder(self):
+        """Finished members whose folder is not there: their collisions are not known."""
+        return [self.name[m] for m in np.flatnonzero(self.status == FINISHED) if not self.folder(m).is_dir()]
+
+    @property
+    def without_mean(self):
+        """Finished members that have no mean ice resistance."""
+        return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(self.mean))]
+
+    def holes(self):
+        """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where
+        nothing is missing."""
+        waiting = [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound]
+        kinds = (("not sound", list(self.unsound)), ("waiting", waiting),
+                 ("failed", [self.name[m]
+                             for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
+        parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
+        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}"
+                if parts else "")
+
+    def exclude(self, kinds):
+        """Leave members with these doubts out from here on; returns {name: kinds} of those dropped."""
+        for m in np.flatnonzero(self.status == FINISHED):
+            hit = self.doubts(m) & set(kinds)
+            if hit:
+                self._dropped[int(m)] = hit
+        return {self.name[m]: sorted(hit) for m, hit in self._dropped.items()}
+
+    @cached_property
+    def copies(self):
+        """{name: name of the other} of finished members that ended in the very state of an earlier one of their
+        condition: no fields of their own, whatever their seeds."""
+        first, out = {}, {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            other = first.setdefault((int(self.condition[m]), self.state[m] or self.name[m]), self.name[m])
+            if other != self.name[m]:
+                out[self.name[m]] = other
+        return out
+
+    @property
+    def used(self):
+        """Rows of members that finished with a mean, are not excluded, and are no copies."""
+        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(self.mean))
+                         if int(m) not in self._dropped and self.name[m] not in self.copies], dtype=int)
+
+    @cached_property
+    def builds(self):
+        """A sentence on members of several builds, or of one that cannot be had again; "" where there is none."""
+        builds = {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            try:
+                with Run(self.folder(m)) as run:
+                    build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
+                    builds[build] = builds.get(build, 0) + 1
+            except RunError:
+                continue
+        said = []
+        if len(builds) > 1:
+            of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
+            said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
+                        f"({of}).")
+        if any(str(build[1]).endswith("-dirty") for build in builds):
+            said.append("The program was built from sources with changes that no revision holds: its results cannot be "
+                        "made again from the revision alone.")
+        return " ".join(said)
+
+    def conditions(self):
+        """Every Condition, in the order of the study."""
+        used, out = set(self.used.tolist()), []
+        for index in np.unique(self.condition):
+            rows = np.flatnonzero(self.condition == index)
+            first = rows[0]
+            values = {
+                key: (str(column[first]) if column.dtype == object else float(column[first]))
+                for key, column in self.parameters.items()
+            }
+            out.append(
+                Condition(int(index), values, self.units, rows, np.array([m for m in rows if m in used], dtype=int),
+                          int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)),
+                          sum(int(m) in self._dropped for m in rows)))
+        return out
+
+    def tows(self, rows, excluded=True):
+        """Rows of all finished members of the conditions of these, with a mean or not, each once; excluded: of those
+        that are excluded, too."""
+        there = np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED)
+        return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies
+                         and (excluded or int(m) not in self._dropped)], dtype=int)
+
+    def without_bound(self, rows):
+        """WithoutBound of the conditions of these rows. Tows that are excluded, and those that ended for it, count:
+        without them the mean would be that of the tows which the ice let pass."""
+        tows = self.tows(rows)
+        shares = np.nan_to_num([self.number("window_no_load_share", m) for m in tows])
+        ended = [self.name[m] for m in np.flatnonzero(np.isin(self.condition, self.condition[rows])
+                                                      & (self.status == FAILED)) if at_least.ended(self.reason[m])]
+        return WithoutBound(float(shares.mean()) if len(tows) else np.nan,
+                            [self.name[m] for m, x in zip(tows, shares) if x > 0], ended, len(tows) + len(ended))
+
+    def impacts(self, m):
+        """Collisions of a member's tow in its window: (time s, peak N, its start s, hours, conversion), or None where
+        they were not told apart, or without a window."""
+        hours, start, end = (self.number(key, m) for key in ("impacts_hours", "impacts_from_s", "window_end_s"))
+        if self.cut(m):
+            hours, end = hours - (end - self.adrift(m)) / 3600, self.adrift(m)
+        if not hours > 0 or not self.folder(m).is_dir():
+            return None
+        with Run(self.folder(m)) as run:
+            hits = run.impacts
+        late = (hits["time"] >= start) & ~(hits["time"] > end)
+        return hits["time"][late], hits["peak"][late], start, hours, hits["conversion"]

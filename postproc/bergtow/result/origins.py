@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Where each value of a case comes from: given with a source, given and called assumed, given without a word, or a
+default.
+
+What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
+case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
+"""
+import json
+import re
+import shlex
+import subprocess
+from dataclasses import dataclass
+from datetime import datetime, timezone
+
+from bergtow._program import program_path
+from bergtow.errors import BergtowError
+
+import numpy as np
+import yaml
+
+TITLE_BLOCK = ("client", "project", "author", "revision")
+
+#: kind: what the label says
+KINDS = {
+    "assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
+    "set": "set",
+    "study": "study", "default": "default", "field": "as read", "unused": "not used"
+}
+
+BESIDE = "set."  #: in the text of a case as given, of the keys that were given beside its files (src/case/case_read.c)
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  #: 20 times as fast, where the package was built with it
+ZERO = 1e-12  #: no value of a key is so small
+
+#: keys of ice that is made, which mean nothing where it is read
+MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread",
+        "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake", "ice.extent.x_min", "ice.extent.x_max",
+        "ice.extent.y_min", "ice.extent.y_max")
+#: used for outlines that have no thickness of their own; a field file always has one
+THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
+
+
+@dataclass(frozen=True)
+class Value:
+    """One key of the resolved case."""
+
+    key: str
+    value: str
+    meaning: str
+    kind: str     #: of KINDS
+    origin: str   #: in words
+
+
+def annotated(text):
+    """{"section.key": (value as written, comment behind it)} of a case in YAML; {} where it cannot be parsed. A case
+    with a base has a document for each of its files, and the first that has a key holds."""
+    try:
+        roots = list(yaml.compose_all(text, Loader=LOADER))
+    except yaml.YAMLError:
+        return {}
+    out = {}
+
+    def walk(node, path):
+        if isinstance(node, yaml.MappingNode):
+            for key, value in node.value:
+                walk(value, [*path, str(key.value)])
+            return
+        if path[:1] in (["floes"], ["base"]):
+            return
+        rest = text[node.end_mark.index:].split("\n",
+                                                1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
+        comment = re.match(r"\s+#\s*(.*)", rest)
+        value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(
+            text[node.start_mark.index:node.end_mark.index].split())
+        out.setdefault(".".join(path), (value, comment[1].strip() if comment else ""))
+
+    for root in roots:
+        if root is not None:
+            walk(root, [])
+    return out
+
+
+def set_by_hand(command_line):
+    """Keys of --set key=value in a command line."""
+    try:
+        words = shlex.split(command_line)
+    except ValueError:
+        words = command_line.split()
+    return {(word[6:] if word.startswith("--set=") else after).split("=")[0]
+            for word, after in zip(words, words[1:] + [""]) if word == "--set" or word.startswith("--set=")}
+
+
+def of_study(run, own):
+    """{key: what the study says beside it} of the keys that the study of a member gives to it; {} for a run of its own.
+    own: {key: value} of what it was given beside its case, {} of an older result, which does not say: there all that
+    the study gives to some member."""
+    folder = run.path.resolve().parent
+    try:
+        text = (folder.parent / "study.yml").read_text(encoding="utf-8") if folder.name == "members" else ""
+        study = yaml.safe_load(text)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return {}
+    if not isinstance(study, dict):
+        return {}
+    said, out = annotated(text), {"ice.seed": ""} | dict.fromkeys(own, "")
+    groups = {name: study.get(name) for name in ("set", "parameters")}
+    for name in ("with", "variants"):
+        some = study.get(name)
+        groups |= {f"{name}.{which}": keys for which, keys in (some if isinstance(some, dict) else {}).items()}
+    for name, keys in groups.items():
+        for key, value in (keys if isinstance(keys, dict) else {}).items():
+            written, comment = said.get(f"{name}.{key}", ("", ""))
+            if name == "parameters" or not own or own.get(key) == written:
+                source = str(value.get("source", "")) if isinstance(value, dict) else ""
+                out[str(key)] = comment or source
+    return out
+
+
+def classify(words):
+    """Kind of a comment on a value: assumed, memory, reported, source or, for none, None.
+
+    By its words, or by the marks of cases/field: [A] assumed, [R] reported without its original source, [P] published.
+    Of several marks the least certain counts.
+    """
+    low = words.lower()
+    if "assumed" in low or "[A]" in words:
+        return "assumed"
+    if "from memory" in low:
+        return "memory"
+    if "[R]" in words:
+        return "reported"
+    return "source" if words else None
+
+
+def of_default(meaning):
+    """(kind, origin) of a default from the meaning of its key: "..., assumed [Source]"."""
+    kind = classify(meaning)
+    source = re.search(r"\[([^\]]*[A-Za-z][^\]]*)\]\s*$", meaning)
+    if kind in ("assumed", "memory"):
+        return kind, f"default, {KINDS[kind]}" + (f" ({source[1]})" if source else "")
+    return ("source", f"default: {source[1]}") if source else ("default", "")
+
+
+def source_of_ice(case):
+    """Key by which the ice was read, or None where it was made; case: {key: text}."""
+    return next((key for key in ("ice.outlines", "ice.field") if case.get(key, "none") not in ("", "none")), None)
+
+
+def not_used(run, case):
+    """{key: why} of the keys of ice that is made, which say nothing of a run that read its ice; case: {key: text}."""
+    ice = source_of_ice(case)
+    if ice is None:
+        return {}
+    thickness = run.value("ice.thickness")
+    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant"
+                                       or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
+    return {
+        key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness")
+        for key in (MADE if asked else MADE + THICKNESS)
+    }
+
+
+def spread(values, unit):
+    """Mean and range of a quantity over the floes, in words."""
+    low, mean, high = np.min(values), np.mean(values), np.max(values)
+    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(
+        high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
+
+
+def of_field(run):
+    """[Value] of the ice as it was, where it was read from a file: the keys for ice that is made say nothing of it."""
+    ice = source_of_ice(run.case)
+    if ice is None or not run.n_floes:
+        return []
+    said = f"counted in the ice that {ice} read"
+    rows = (("floes", str(run.n_floes),
+             "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
+                                  "area fraction of ice in the ice region at the start, before a lead"),
+            ("floe size", spread(np.sqrt(4 * run.area / np.pi),
+                                 "m"), "diameter of the circle of a floe's area: mean and range"),
+            ("floe thickness", spread(run.thickness, "m"), "mean and range"))
+    return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
+
+
+def values(run):
+    """[Value] of every key of the resolved case, in its order."""
+    resolved, out = annotated(run.resolved_text), []
+    unused = not_used(run, {key: value for key, (value, _) in resolved.items()})
+    given = annotated(run.case_text)
+    own = {key[len(BESIDE):]: value for key, (value, _) in given.items() if key.startswith(BESIDE)}
+    study = of_study(run, own)
+    # that of a study is of all its members; older results have no other word on what was set
+    by_hand = set_by_hand(str(run.attributes.get("command_line", ""))) | set({} if study else own)
+    for key, (value, meaning) in resolved.items():
+        if key in unused:
+            kind, origin = "unused", unused[key]
+        elif key in by_hand:
+            kind, origin = "set", "set beside the case file, as by --set; no source stated"
+        elif key in study:
+            kind = classify(study[key]) or "study"
+            origin = "set by the study" + (f": {study[key]}" if study[key] else "; no source stated")
+        elif key in given:
+            kind = classify(given[key][1]) or "given"
+            origin = given[key][1] or "given in the case file; no source stated"
+        else:
+            kind, origin = of_default(meaning)
+        out.append(Value(key, value, meaning, kind, origin))
+    return out
+
+
+def title_block(case, attributes, given):
+    """Rows (what, value) of the title block: what is given on the command line, or in the section `report` of a case,
+    {key: text}; the date, and the program by its attributes."""
+    rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
+    return [(name, scrubbed(" ".join(value.split())) if value not in ("", "none") else "–") for name, value in rows] + [
+        ("date", datetime.now(timezone.utc).strftime("%Y-%m-%d")),
+        ("program", f"bergtow {attributes.get('version', '')}, revision {attributes.get('revision', 'unknown')}")]
+
+
+def scrubbed(text):
+    """Without the paths of the machine that made it: of each the last part is left."""
+    return re.sub(r"(?<![\w./])(?:~|\.\.?)?/(?:[^\s/:'\"]+/)+([^\s/:'\"]*)", r"\1", text)
+
+
+def short(value):
+    """A value as the resolved case has it, with six digits in place of all; what rounding left of zero is zero. Angles,
+    which it has in radians, are in degrees, as the keys ask for them."""
+    value = re.sub(r"(?<![\w.])(-?\d+\.?\d*(?:e[-+]?\d+)?) rad\b",
+                   lambda found: f"{np.degrees(float(found[1])):.6g} deg", value)
+    def digits(found):
+        number = float(found[0])
+        return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"
+    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", digits, value)
+
+
+def _range(key):
+    """What the program admits for a key, an entry of --list-keys --json."""
+    if key["type"] == "choice":
+        return ", ".join(key["choices"])
+    if "least" not in key:
+        return ""
+    low, high, unit = key["least"], key["most"], key.get("unit", "").replace("-", "")
+    low = f"above {low:g}" if key.get("above_least") else f"{low:g}"
+    return f"{low} to {'below ' if key.get('below_most') else ''}{high:g} {unit}".strip()
+
+
+def ranges():
+    """{key: range that the program admits}; {} where it cannot be asked."""
+    try:
+        said = subprocess.run([program_path(), "--list-keys", "--json"], capture_output=True, timeout=60, check=True)
+        return {key["name"]: _range(key) for key in json.loads(said.stdout)["keys"]}
+    except (BergtowError, OSError, ValueError, subprocess.SubprocessError):
+        return {}
+
+
+def preface(text):
+    """The comment at the head of a case file, without its marks: list of paragraphs. Lines of a sentence are joined;
+    items of a list, tables and what is set in keep theirs."""
+    paragraphs = [""]
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        line = line.lstrip("#").removeprefix(" ").rstrip()
+        if not line:
+            paragraphs.append("")
+        elif paragraphs[-1]:
+            paragraphs[-1] += ("\n" if re.match(r"\s|[-*|] ", line) else " ") + line
+        else:
+            paragraphs[-1] = line
+    return [p for p in paragraphs if p.strip()]

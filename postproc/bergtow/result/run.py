@@ -1,0 +1,693 @@
+# SPDX-License-Identifier: MIT
+"""Read the output folder of a bergtow run: summary, series, frames, bodies and the case.
+
+    run = Run("out/basin-80")
+    run.summary["mean_ice_resistance_n"]       # numbers of summary.json
+    t, f = run["time"], run["ice_resistance"]  # series as float64 arrays [S]
+    run.units("ice_resistance")                # "N"
+    for outline in run.polygons(0):            # floes of frame 0, each [n, 2] m in the world frame
+        ...
+
+Lengths are in m, times in s, forces in N, angles in rad. Everything is read on first use and kept, but for
+frames, which are read one at a time. A folder that cannot be used raises RunError, whose text names the path,
+the reason and the remedy.
+"""
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import yaml
+
+from bergtow.errors import RunError
+from bergtow.result import at_least
+from bergtow.result.hdf5 import first_line, opened, plain
+
+
+def within(time, start, end):
+    """[n] of bool: samples that end between two times, these included, but for a last one of fewer steps than the
+    others, which a run leaves that ends within it."""
+    slack = 1e-9 * max(1.0, abs(time[-1])) if len(time) else 0.0
+    there = (time >= start - slack) & (time <= end + slack)
+    if len(time) > 2 and time[-1] - time[-2] < (1 - 1e-6) * (time[-2] - time[-3]):
+        there[-1] = False
+    return there
+
+
+def least(x):
+    """A load that is no number in some steps (no_load) with the last number before each in its place, 0 at the start.
+    It has no bound there, so means and peaks of this are the least that they can be. A load without numbers stays."""
+    there = np.isfinite(x)
+    if there.all() or not there.any():
+        return x
+    last = np.maximum.accumulate(np.where(there, np.arange(len(x)), -1))
+    return np.where(last < 0, 0.0, x[np.maximum(last, 0)])
+
+
+def notes(found):
+    """Warnings or reasons of a summary, [{"code", "text", "values"}]; other entries are left out."""
+    return [{"code": str(note.get("code")), "text": str(note.get("text", "")), "values": note.get("values") or {}}
+            for note in (found if isinstance(found, list) else ()) if isinstance(note, dict)]
+
+
+class Numbers(dict):
+    """An object of summary.json. Errors: RunError for a key that it does not have."""
+
+    def __init__(self, path, found):
+        super().__init__(found)
+        self.file = path
+
+    def __missing__(self, key):
+        raise RunError(self.file, f"has no {key}", "the file is damaged, or of another version: run the case again")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An estimate of the resistance as a file tells of it."""
+
+    name: str
+    label: str
+    on_top: bool         #: no resistance of ice: it comes on top of the others, and no run is held against it
+    uses_floe_size: bool  #: its curve differs between fields of one case
+    numbers: dict        #: what summary.json says: force_n, low_n, high_n, valid, compares, note, ...
+
+    @property
+    def force(self):
+        """N, NaN where the formula has no value."""
+        force = self.numbers.get("force_n")
+        return np.nan if force is None else force
+
+    @property
+    def valid(self):
+        """It is meant for the conditions."""
+        return bool(self.numbers.get("valid"))
+
+    @property
+    def compares(self):
+        """A run is held against it: it is valid, and knows the concentration."""
+        return bool(self.numbers.get("compares")) and self.force > 0
+
+
+def estimates_of(summary):
+    """{name: Estimate} of a summary, in the order of the program's registry; {} where there are none."""
+    found, labels = summary.get("estimates"), summary.get("estimate_labels")
+    found = found if isinstance(found, dict) else {}
+    out = {}
+    for name, numbers in found.items():
+        if not (isinstance(numbers, dict) and "force_n" in numbers):
+            continue  # a condition, or the curves
+        about = labels[name]
+        out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
+                             numbers)
+    return out
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that is not a floe: the towed body, a wall, or a fixed body given by hand."""
+
+    name: str
+    vertices: np.ndarray  #: [n, 2] m, body frame, anticlockwise in (x, y)
+    towed: bool
+
+    @property
+    def wall(self):
+        return self.name.startswith("wall")
+
+
+def place(vertices, pose):
+    """World coordinates [n, 2] m of vertices [n, 2] m (body frame) at pose (x m, y m, yaw rad)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(vertices) @ np.array([[c, s], [-s, c]]) + np.asarray(pose[:2])
+
+
+def parse_case(text):
+    """The values of a case file as {"section.key": text}, lists in one line; floes given by hand are left out."""
+    out = {}
+
+    def walk(node, path):
+        if isinstance(node, dict):
+            for key, below in node.items():
+                walk(below, [*path, key])
+        elif path[0] != "floes":
+            out[".".join(path)] = _in_one_line(node)
+
+    walk(yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader)) or {}, [])
+    return {key: value for key, value in out.items() if value}
+
+
+def _in_one_line(node):
+    return f"[{', '.join(map(_in_one_line, node))}]" if isinstance(node, list) else node
+
+
+def case_value(case, key, default=np.nan):
+    """Number of a key of parse_case, in SI units and radians as bergtow writes it; default where it is missing or no
+    number."""
+    match = re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)(?: [^\d].*)?", case.get(key, ""))
+    try:
+        return float(match[1]) if match else default
+    except ValueError:
+        return default
+
+
+def _pairs(text):
+    """[(number, number)] of a sequence of pairs, as the resolved case has them."""
+    return re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", text)
+
+
+class Run:
+    """The output folder of one run.
+
+    path        folder
+    summary     dict, the numbers of summary.json
+    attributes  dict, provenance (root attributes of result.h5)
+    Errors: RunError, from the constructor for missing or damaged files, later for missing or damaged entries.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        if not self.path.exists():
+            raise RunError(self.path, "no such folder", "give the folder that `bergtow run -o` wrote")
+        if not self.path.is_dir():
+            raise RunError(self.path, "not a folder", "give the folder of the run, not a file in it")
+        self.result = self.path / "result.h5"
+        self.summary = self._read_summary(self.path / "summary.json")
+        self._file = self._open()
+        self._cache = {}
+        self.attributes = {k: plain(v) for k, v in self._file.attrs.items()}
+
+    def close(self):
+        """Close result.h5. What was read stays usable."""
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exc):
+        self.close()
+
+    # ---- files
+
+    def _read_summary(self, path):
+        try:
+            summary = json.loads(path.read_text(encoding="utf-8"), object_hook=lambda found: Numbers(path, found))
+        except FileNotFoundError:
+            if not self.result.exists():
+                raise RunError(self.path, "holds neither summary.json nor result.h5",
+                               "give the folder that `bergtow run -o` wrote") from None
+            raise RunError(path, "missing: the run has not ended, or was killed",
+                           "wait for it, or run the case again") from None
+        except (OSError, UnicodeDecodeError) as error:
+            raise RunError(path, f"cannot be read ({error})", "check the file and its permissions") from None
+        except ValueError as error:
+            raise RunError(path, f"damaged ({error})", "run the case again") from None
+        if not isinstance(summary, dict):
+            raise RunError(path, "damaged (no JSON object)", "run the case again")
+        return at_least.summary(summary)
+
+    def _open(self):
+        if not self.result.exists():
+            raise RunError(self.result, "missing", "run the case again: this file holds series and frames")
+        return opened(self.result, "the file is truncated or still being written: wait for the run, or run the case "
+                      "again")
+
+    def _dataset(self, name):
+        try:
+            node = self._file[name]
+        except (KeyError, ValueError, OSError, RuntimeError):
+            raise RunError(self.result, f"has no /{name}", "the file is incomplete: run the case again") from None
+        if not isinstance(node, h5py.Dataset):
+            raise RunError(self.result, f"/{name} is not a data set", "the file is damaged: run the case again")
+        return node
+
+    def _read(self, name, index=(), ndim=None):
+        """Data set (or one entry of it) as an array; float data as float64."""
+        node = self._dataset(name)
+        if ndim is not None and node.ndim != ndim:
+            raise RunError(self.result, f"/{name} has {node.ndim} dimensions, not {ndim}",
+                           "the file is damaged: run the case again")
+        try:
+            data = node[index]
+        except (OSError, RuntimeError) as error:
+            raise RunError(self.result, f"/{name} cannot be read ({first_line(error)})",
+                           "the file is damaged: run the case again") from None
+        data = np.asarray(data)
+        return data.astype(float) if data.dtype.kind == "f" else data
+
+    def _once(self, key, make):
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
+
+    # ---- series
+
+    @property
+    def series_names(self):
+        """Names of the series, sorted."""
+        group = self._file.get("series")
+        return sorted(group) if isinstance(group, h5py.Group) else []
+
+    def __contains__(self, name):
+        return f"series/{name}" in self._file
+
+    def __getitem__(self, name):
+        """Series [S], float64, in units(name)."""
+        def read():
+            data = self._read(f"series/{name}", ndim=1).astype(float)
+            if len(data) != self._dataset("series/time").shape[0]:
+                raise RunError(self.result, f"/series/{name} is not as long as /series/time",
+                               "the file is damaged: run the case again")
+            return data
+        return self._once(("series", name), read)
+
+    def units(self, name):
+        """Units of a series, "" when the file gives none."""
+        return str(plain(self._dataset(f"series/{name}").attrs.get("units", "")))
+
+    def description(self, name):
+        """One sentence on a series."""
+        return self.attribute(name, "description")
+
+    def attribute(self, name, what):
+        """An attribute of a series: role, label, summary, merge, ...; "" where the file has none."""
+        return str(plain(self._dataset(f"series/{name}").attrs.get(what, "")))
+
+    def label(self, name):
+        """What pictures and tables call a series."""
+        return self.attribute(name, "label") or name.replace("_", " ")
+
+    def by_role(self, *roles):
+        """Names of the series with one of these roles ("balance", "force", "load", "diagnostic"), in the order of the
+        program's registry."""
+        attributes = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
+        return sorted((n for n in attributes if plain(attributes[n].get("role", "")) in roles),
+                      key=lambda n: int(attributes[n]["order"]))
+
+    @property
+    def balance(self):
+        """The towed body's balance in the labels of its series, the ice resistance by the others:
+        "tow − drag − ... − inertia"."""
+        ends = "tow_force", "ice_resistance", "inertia_force"
+        terms = [self.label(name) for name in self.by_role("balance") if name not in ends]
+        return " − ".join(["tow", *terms, "inertia"])
+
+    @property
+    def estimates(self):
+        """{name: Estimate}."""
+        return estimates_of(self.summary)
+
+    @property
+    def window(self):
+        """(start s, end s) of the window that the means of the summary refer to, or None."""
+        window = self.number("window.start_s"), self.number("window.end_s")
+        return window if np.isfinite(window).all() else None
+
+    @property
+    def ordered_speed(self):
+        """The speed that the case orders at each sample [S], m/s; NaN where it orders none."""
+        programme, time = np.array(_pairs(self.case.get("tow.programme", "")), dtype=float), self["time"]
+        if len(programme):
+            return np.interp(time, *programme.T)
+        ramp = self.value("tow.ramp", 0.0)
+        return self.value("tow.speed") * (np.clip(time / ramp, 0.0, 1.0) if ramp > 0 else np.ones_like(time))
+
+    @property
+    def headings(self):
+        """[K, 2], unit vectors along the legs of the ordered tow."""
+        pairs = _pairs(self.case.get("tow.waypoints", ""))
+        if not pairs:
+            heading = self.value("tow.direction", 0.0)
+            return np.array([[np.cos(heading), np.sin(heading)]])
+        ways = np.diff(np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float), axis=0)
+        return ways / np.hypot(*ways.T)[:, None]
+
+    @property
+    def way(self):
+        """How far the body has come along the ordered tow [S], m, from the first sample on: sway counts nothing, and
+        what drives it back counts against it.
+
+        Which leg it is on cannot be told from its place alone, for legs may meet or lie side by side; nor by the
+        event, since the body may come a line length after what tows it. So it changes legs where that makes its way
+        longest, once the way-point is passed: a body that cuts the corner has turned by half the angle there, and one
+        that is towed back is about to return.
+        """
+        def find():
+            x = np.column_stack([self["body_x"], self["body_y"]])
+            along = (x - x[0]) @ self.headings.T
+            way, time = along[:, 0].copy(), self["time"]
+            for event in self.events:
+                if event["kind"] != "waypoint" or event["subject"] >= along.shape[1]:
+                    continue
+                leg = along[:, event["subject"]]
+                k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before it
+                way[k:] = leg[k:] + np.maximum.accumulate(way[k:] - leg[k:])
+            return way
+        return self._once("way", find)
+
+    def made_good(self, start, end):
+        """Mean speed of the body over ground along the ordered tow between two times, m/s; negative where it is driven
+        back. NaN without a body."""
+        if "body_x" not in self or not end > start:
+            return np.nan
+        first, last = np.interp([start, end], self["time"], self.way)
+        return float((last - first) / (end - start))
+
+    @property
+    def speed_made_good(self):
+        """That over the window as long as something tows the body; NaN without two samples of it."""
+        if self.window is None:
+            return np.nan
+        start, end = self.window[0], min(self.window[1], self.adrift)
+        return self.made_good(start, end) if np.sum(within(self["time"], start, end)) > 1 else np.nan
+
+    @property
+    def verdict(self):
+        """("steady", "not steady" or "too short", the reasons as one text); "not judged" of a result that names no
+        verdict: one without a towed body."""
+        window = self.summary.get("window")
+        window = window if isinstance(window, dict) else {}
+        return str(window.get("verdict") or "not judged"), "; ".join(r["text"] for r in notes(window.get("reasons")))
+
+    @property
+    def warnings(self):
+        """[{"code", "text", "values"}]: codes and values for programs, texts for readers."""
+        return notes(self.summary.get("warnings"))
+
+    @property
+    def window_name(self):
+        """How the window may be called: "steady window" for a steady tow alone."""
+        return "steady window" if self.verdict[0] == "steady" else "window"
+
+    @property
+    def mean_name(self):
+        """How a mean of it may be called."""
+        found = "mean" if self.verdict[0] == "steady" else "mean over the window"
+        return f"{found} ({at_least.words(self.number('window.no_load_share'))})" if self.at_least else found
+
+    def interval(self, key):
+        """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;
+        NaN where it is not known."""
+        return tuple(self.number(f"mean_{key}_{which}n") for which in ("", "low_", "high_"))
+
+    def number(self, key, default=np.nan):
+        """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""
+        value = self.summary
+        for part in key.split("."):
+            value = value.get(part) if isinstance(value, dict) else None
+        if isinstance(value, at_least.AtLeast):
+            return value
+        return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
+
+    @property
+    def at_least(self):
+        """Are means and peaks of the loads over the window lower bounds, since steps in it have no solution?"""
+        return self.number("window.no_load_share", 0.0) > 0
+
+    @property
+    def events(self):
+        """What happened in the run, in order: [{"time_s", "kind", "subject", "value"}], kinds and numbers as /events of
+        result.h5 has them. summary.json has the first 40; they are taken where the file has none."""
+        def read():
+            if "events/kind_names" not in self._file:
+                return list(self.summary.get("events") or [])
+            names = [plain(name) for name in self._read("events/kind_names")]
+            rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
+            return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
+        return self._once("events", read)
+
+    @property
+    def adrift(self):
+        """From when on nothing tows the body, s; inf where something does to the end."""
+        return min((e["time_s"] for e in self.events if e["kind"] == "adrift"), default=np.inf)
+
+    @property
+    def steps_per_sample(self):
+        """Steps in a sample of the series, output.sample_every."""
+        return int(self._file["series"].attrs.get("steps_per_sample", 1)) if "series" in self._file else 1
+
+    # ---- case
+
+    def _text(self, name):
+        return self._once(name, lambda: str(plain(self._read(name)[()])))
+
+    @property
+    def case_text(self):
+        """Text of the case file as it was given."""
+        return self._text("case_as_given" if "case_as_given" in self._file else "case")
+
+    @property
+    def resolved_text(self):
+        """Text of the resolved case, as in case.resolved.yml: every key with its unit, meaning and source."""
+        return self._text("case")
+
+    @property
+    def case(self):
+        """{"section.key": text} of the resolved case: every key, numbers with their units."""
+        return self._once("resolved", lambda: parse_case(self.resolved_text))
+
+    def value(self, key, default=np.nan):
+        """Number of a case key in SI units and radians; default where it is missing or no number."""
+        return case_value(self.case, key, default)
+
+    @property
+    def geographic(self):
+        """True in the frame x north, y east; False in the basin's."""
+        return self.case.get("domain.frame") == "geographic"
+
+    @property
+    def box(self):
+        """(x0, x1, y0, y1) m of the domain; from the floes of the first frame when the case does not say."""
+        def find():
+            length, width = self.value("domain.length"), self.value("domain.width")
+            x0 = self.value("domain.x0", -length / 2 if self.geographic else 0.0)
+            y0 = self.value("domain.y0", -width / 2)
+            box = np.array([x0, x0 + length, y0, y0 + width])
+            if np.isfinite(box).all():
+                return tuple(box)
+            points = self._world(self.pose(0)) if self.n_floes else self.body_polygons(0)[0]
+            return (*_extent(points[:, 0]), *_extent(points[:, 1]))
+        return self._once("box", find)
+
+    @property
+    def period(self):
+        """(P_x, P_y) m; 0 along a direction that is not periodic."""
+        x0, x1, y0, y1 = self.box
+        return (x1 - x0 if self.case.get("domain.ends") in ("periodic", "moving") else 0.0,
+                y1 - y0 if self.case.get("domain.sides") == "periodic" else 0.0)
+
+    # ---- floes and bodies
+
+    def _outlines(self, group):
+        def read():
+            vertices = self._read(f"{group}/vertices", ndim=2)
+            offsets = self._read(f"{group}/offsets", ndim=1).astype(np.int64)
+            sound = (vertices.shape[1] == 2 and len(offsets) > 0 and offsets[0] == 0
+                     and offsets[-1] == len(vertices) and (np.diff(offsets) > 0).all())
+            if not sound:
+                raise RunError(self.result, f"/{group}/offsets does not fit /{group}/vertices",
+                               "the file is damaged: run the case again")
+            return vertices, offsets
+        return self._once(("outlines", group), read)
+
+    @property
+    def vertices(self):
+        """[V, 2] m, outlines of all floes one after the other, body frame."""
+        return self._outlines("floes")[0]
+
+    @property
+    def offsets(self):
+        """[N+1], floe i owns vertices[offsets[i]:offsets[i+1]]."""
+        return self._outlines("floes")[1]
+
+    @property
+    def n_floes(self):
+        return len(self.offsets) - 1
+
+    @property
+    def thickness(self):
+        """[N] m."""
+        return self._once("thickness", lambda: self._read("floes/thickness", ndim=1))
+
+    @property
+    def area(self):
+        """[N] m²."""
+        return self._once("area", lambda: self._read("floes/area", ndim=1))
+
+    @property
+    def bodies(self):
+        """List of Body: whatever is not a floe, in the order of body_pose; empty when there is none."""
+        def read():
+            if "bodies" not in self._file:
+                return []
+            vertices, offsets = self._outlines("bodies")
+            n = len(offsets) - 1
+            names = [str(plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
+            towed = int(np.ravel(self._read("bodies/towed"))[0])
+            if len(names) != n or not -1 <= towed < n:
+                raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
+                               "the file is damaged: run the case again")
+            return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], i == towed) for i in range(n)]
+        return self._once("bodies", read)
+
+    @property
+    def towed(self):
+        """Index of the towed body in bodies, or None."""
+        return next((i for i, body in enumerate(self.bodies) if body.towed), None)
+
+    # ---- loads on the towed body
+
+    def _group(self, name, meaning):
+        """Attributes and data sets of a group as one dict."""
+        node = self._file.get(name)
+        if not isinstance(node, h5py.Group):
+            raise RunError(self.result, f"has no /{name}",
+                           f"{meaning}: run a case with a towed body and impact.conversion other than none")
+        return {**{k: plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
+
+    @property
+    def impacts(self):
+        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", what a
+        peak means."""
+        return self._once("impacts", lambda: self._group("impacts", "collisions were not told apart"))
+
+    @property
+    def panels(self):
+        """Panels of the hull: dict of "ends" [P+1, 2], "middle" and "normal" [P, 2], body frame, m; loads "mean_load",
+        "max_load", ... [P] N."""
+        return self._once("panels", lambda: self._group("panels", "loads by panel were not kept"))
+
+    @property
+    def panel_series(self):
+        """{"units": of the loads on panels, "load": [S, P] their series where the run kept it (output.panels)}."""
+        group = self._file.get("panels")
+        if not isinstance(group, h5py.Group) or "mean_load" not in group:
+            return {}
+        out = {"units": str(plain(group["mean_load"].attrs.get("units", "")))}
+        if "load" in group:
+            out["load"] = self._read("panels/load", ndim=2)
+        return out
+
+    # ---- frames
+
+    @property
+    def frame_times(self):
+        """[T] s."""
+        return self._once("times", lambda: self._read("frames/time", ndim=1))
+
+    @property
+    def n_frames(self):
+        return len(self.frame_times)
+
+    def frame_at(self, time):
+        """Index of the frame nearest to a time, s."""
+        if not self.n_frames:
+            raise RunError(self.result, "holds no frames", "set output.frame_interval and run the case again")
+        return int(np.argmin(np.abs(self.frame_times - time)))
+
+    def _frame(self, name, frame, width):
+        if not -self.n_frames <= frame < self.n_frames:
+            raise RunError(self.result, f"has no frame {frame} (there are {self.n_frames})", "choose another frame")
+        data = self._read(f"frames/{name}", frame % self.n_frames)
+        if data.shape[:1] != (width,):
+            raise RunError(self.result, f"/frames/{name} has {data.shape[:1]} entries a frame, not {width}",
+                           "the file is damaged: run the case again")
+        return data
+
+    def pose(self, frame):
+        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped)."""
+        return self._frame("pose", frame, self.n_floes)
+
+    def body_pose(self, frame):
+        """[B, 3] x m, y m, yaw rad of the bodies, as written."""
+        return self._frame("body_pose", frame, len(self.bodies)) if self.bodies else np.zeros((0, 3))
+
+    def contact_force(self, frame):
+        """[N] N, largest normal contact force on each floe in the step of the frame; NaN where that has no solution."""
+        return self._frame("contact_force", frame, self.n_floes)
+
+    def least_contact_force(self, frame):
+        """The same for pictures: that of the last frame before whose step has a solution stands in for NaN, 0 at the
+        start, as in series."""
+        for k in range(frame % max(1, self.n_frames), -1, -1):
+            force = self.contact_force(k)
+            if not np.isnan(force).any():
+                return force
+        return np.zeros(self.n_floes)
+
+    def speed(self, frame):
+        """[N] m/s, speed of each floe."""
+        return self._frame("speed", frame, self.n_floes + len(self.bodies))[:self.n_floes]
+
+    def wrap(self, xy, centre=None):
+        """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).
+
+        Directions that are not periodic are left alone, to the bit.
+        """
+        x0, x1, y0, y1 = self.box
+        centre = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
+        xy = np.array(xy, dtype=float)
+        for axis, period in enumerate(self.period):
+            if period > 0:
+                xy[:, axis] -= period * np.floor((xy[:, axis] - centre[axis]) / period + 0.5)
+        return xy
+
+    def _world(self, pose):
+        """[V, 2] m, all vertices of the floes in the world frame."""
+        counts = np.diff(self.offsets)
+        c, s = np.repeat(np.cos(pose[:, 2]), counts), np.repeat(np.sin(pose[:, 2]), counts)
+        v = self.vertices
+        return np.stack([np.repeat(pose[:, 0], counts) + c * v[:, 0] - s * v[:, 1],
+                         np.repeat(pose[:, 1], counts) + s * v[:, 0] + c * v[:, 1]], axis=1)
+
+    @property
+    def _padding(self):
+        """[N, M] index into vertices, outlines filled up to the longest one by repeating their last vertex."""
+        def make():
+            counts = np.diff(self.offsets)
+            return self.offsets[:-1, None] + np.minimum(np.arange(counts.max(initial=1)), counts[:, None] - 1)
+        return self._once("padding", make)
+
+    def polygons(self, frame, centre=None):
+        """Floes of a frame in the world frame: list of N arrays [n_i, 2] m; wrapped as by wrap()."""
+        pose = self.pose(frame)
+        pose[:, :2] = self.wrap(pose[:, :2], centre)
+        return np.split(self._world(pose), self.offsets[1:-1]) if self.n_floes else []
+
+    def polygon_array(self, frame, centre=None):
+        """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
+
+        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. The first N rows are the
+        floes in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
+        """
+        pose = self.pose(frame)
+        pose[:, :2] = self.wrap(pose[:, :2], centre)
+        outlines = self._world(pose)[self._padding] if self.n_floes else np.zeros((0, 1, 2))
+        index = np.arange(self.n_floes)
+        x0, x1, y0, y1 = self.box
+        middle = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
+        for axis, period in enumerate(self.period):
+            if period <= 0 or not len(outlines):
+                continue
+            shift = np.zeros(2)
+            shift[axis] = period
+            low = outlines[:, :, axis].min(axis=1) < middle[axis] - period / 2
+            high = outlines[:, :, axis].max(axis=1) > middle[axis] + period / 2
+            outlines = np.concatenate([outlines, outlines[low] + shift, outlines[high] - shift])
+            index = np.concatenate([index, index[low], index[high]])
+        return outlines, index
+
+    def body_polygons(self, frame, centre=None):
+        """Bodies of a frame in the world frame: list of arrays [n, 2] m in the order of bodies.
+
+        The towed body is wrapped as by wrap(); walls and fixed bodies stand where the file puts them.
+        """
+        pose = self.body_pose(frame)
+        if self.towed is not None:
+            pose[self.towed, :2] = self.wrap(pose[self.towed:self.towed + 1, :2], centre)[0]
+        return [place(body.vertices, p) for body, p in zip(self.bodies, pose)]
+
+
+def _extent(x):
+    return float(np.min(x)), float(np.max(x))

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: MIT
+"""The design statement of an ensemble: for each condition the tow force that is exceeded with a stated probability in a
+tow of stated length, its interval over fields, what it holds for, and what speaks against it.
+
+    p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
+Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
+domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a start-up,
+which no number holds, that takes more than the value, fields that are not alike.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+
+from bergtow import _library
+from bergtow.errors import RunError
+from bergtow.result.members import short_key
+from bergtow.result.origins import source_of_ice
+from bergtow.result.origins import short as in_short
+from bergtow.result.run import Run
+from bergtow.stats import loads
+from bergtow.stats import alike as stat_alike
+from bergtow.stats import load as stat_load
+from bergtow.stats import mean as stat_mean
+from bergtow.stats import profile as stat_profile
+from bergtow.table import hours_text, quantity, short
+
+LONG = 2.0          # the tow of the statement / the tow simulated: beyond, a longer load than any simulated is meant
+FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
+WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
+SHORT_FIELDS = stat_profile.LEAST_FIELDS
+#: doubts about members (result/members.py: DOUBTS) that concern the value
+DOUBTFUL = {
+    "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
+    "unsteady": "members whose window is not steady",
+    "short": "members with fewer than 20 independent samples",
+    "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
+    "stopped": "members that stopped early"
+}
+#: what stands in the line of what the values hold for: case key, words in front and behind
+HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
+             ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
+             ("tow.speed", "", ""), ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
+TOWED = {"speed": " prescribed", "line": " of the towing end of the line", "thrust": " asked of the vessel"}
+#: what moves water and air: words where all keys are at zero, and these keys
+STILL = {"no current": ("water.current_x", "water.current_y", "water.tide.major", "water.current_table"),
+         "no wind": ("air.wind_x", "air.wind_y", "air.wind_table")}
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a statement has to know of a condition's case."""
+
+    rigid: bool            #: nothing limits the force of a floe
+    jams: bool             #: its rigid floes are so dense that they jam
+    mode: str
+    breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that part
+    bollard_pull: float    #: N, NaN without a vessel
+    ramp: float            #: s, over which the tow is brought to its speed
+    texts: dict            #: {key: value as written}
+
+    @property
+    def breaking_load(self):
+        """That of the weaker branch, N; NaN where none parts."""
+        return min(self.breaking_loads.values(), default=np.nan)
+
+    @property
+    def breaking_words(self):
+        """"150 kN", of a bridle "150 kN of branch 1, 120 kN of branch 2"; "" where none parts."""
+        found = {name[len(loads.TENSION):]: quantity(load, "N") for name, load in self.breaking_loads.items()}
+        return found["1"] if list(found) == ["1"] else ", ".join(f"{load} of branch {k}" for k, load in found.items())
+
+
+def _breaking_loads(run, mode):
+    keys = ("tow.line.breaking_load", "tow.branch2.breaking_load")[:int(run.value("tow.line.branches", 1.0))]
+    found = {f"{loads.TENSION}{k + 1}": run.value(key, 0.0) for k, key in enumerate(keys)}
+    return {name: load for name, load in found.items() if load > 0 and mode != "speed"}
+
+
+def ice_as_read(run):
+    """{key: value} of a run whose ice is read from a file: the keys say nothing of it."""
+    if source_of_ice(run.case) is None or not run.n_floes:
+        return {}
+    size = np.sqrt(4 * run.area / np.pi).mean()
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness.mean():.3g} m"}
+
+
+def case_of(e, rows):
+    """Case of the first member of a condition that can be read, None where none can."""
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
+                mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
+                return Case(not any(x > 0 for x in limits), unbounded(e, rows), mode, _breaking_loads(run, mode),
+                            pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
+                            run.case | ice_as_read(run))
+        except RunError:
+            continue
+    return None
+
+
+def cases(e, s):
+    """[(condition of the statistics s, its Case)] of the conditions whose case can be read."""
+    found = [(c, case_of(e, of.finished)) for c, of in zip(s["conditions"], e.conditions())]
+    return [(c, case) for c, case in found if case]
+
+
+def speed_made_good(e, rows):
+    """Mean over fields of the speed in the window, m/s, with its interval; None where no member has one."""
+    speeds = []
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                speeds.append(run.speed_made_good)
+        except RunError:
+            continue
+    speeds = np.array([v for v in speeds if np.isfinite(v)])
+    return {"value": speeds.mean(), "interval_95": stat_mean.t_interval(speeds) if len(speeds) > 1 else (np.nan, np.nan)
+            } if len(speeds) else None
+
+
+def _numbers(e, name, rows):
+    return e.summary.get(name, np.full(e.n, np.nan))[rows]
+
+
+def unbounded(e, rows):
+    """Is there a member whose rigid floes jam?"""
+    return bool(np.any(_numbers(e, "domain_load_unbounded", rows) == 1))
+
+
+def domain(e, rows):
+    """How much too narrow the domain is, "" where it is not."""
+    widths, needed = (_numbers(e, f"domain_body_widths{name}", rows) for name in ("", "_needed"))
+    if np.any(few := widths < needed):
+        return f"{widths[few].min():.3g} body widths; {needed[few].max():.3g} are asked for"
+    return ""
+
+
+def _of_the_case(e, rows, case, tow):
+    """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
+    out = []
+    if case is None:
+        out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
+    elif case.jams:
+        out.append(("rigid floes so dense that they jam: nothing in the model limits the force of a jam, so "
+                    "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
+                    f"{100 * np.nanmax(_numbers(e, 'concentration', rows), initial=0.0):.0f} %"))
+    if case is not None and case.mode == "speed":
+        out.append(("the speed is prescribed: neither vessel nor line yields", ""))
+    if narrow := domain(e, rows):
+        out.append(("the domain is narrow for this ice, and floes can arch to walls or to the periodic image: the "
+                    "value can be too large", narrow))
+    left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
+    if np.nanmax(left, initial=0.0) > 0:
+        out.append(("floes left through the open ends of the domain and resist no more: the value can be too small",
+                    f"{np.sum(left > 0)} of {len(rows)} members, up to {np.nanmax(left):.0f} floes"))
+    if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
+        out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
+                    quantity(case.bollard_pull, "N")))
+    return out
+
+
+def _of_the_sample(e, rows, c, load):
+    """The same of how much was simulated, and of the tail."""
+    out, d = [], load["design"]
+    for kind, words in DOUBTFUL.items():
+        some = [words + (f", since {e.why_unsteady(m)}" if kind == "unsteady" else "")
+                for m in rows if kind in e.doubts(m)]
+        out += [(what, f"{some.count(what)} of {len(rows)} members") for what in dict.fromkeys(some)]
+    if c["drift"]["verdict"] == "not steady":
+        out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
+    if load["fields"] < load["members"]:
+        out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
+                    "in which it is known throughout, are in no number of it",
+                    f"{load['members'] - load['fields']} of {load['members']} members"))
+    if load["fields"] < SHORT_FIELDS:
+        out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
+                    f"{load['fields']}"))
+    if load["step_mean"]:
+        out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
+    if "refused" in d:
+        return out + [("no value", d["refused"])]
+    out += _of_unlike_fields(load)
+    hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
+    needed = np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0)
+    if hours > LONG * simulated > 0 and needed >= _library.limit("locking_body_widths"):
+        out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
+                    "for tows of the length simulated, one after the other",
+                    f"{hours_text(hours)} against {hours_text(simulated)}"))
+    if d["times_the_hours_simulated"] > FAR:
+        more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
+        out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
+                    f"{short(d['times_the_hours_simulated'], 2)} times; with {more} fields {FAR:g} times"))
+    if d["irregular"]:
+        out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
+                    "and the value can be too small", f"shape {d['shape']:.2g}"))
+    if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
+        out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
+    return out + _of_the_models(load)
+
+
+def _of_unlike_fields(load):
+    """Do the fields differ by more than chance? Of a single field another warning tells."""
+    p = load["alike_p"]
+    if np.isnan(p):
+        return [("the windows are too short to tell whether the fields are alike, as the interval takes them", "")
+                ] if load["fields"] > 1 else []
+    return [] if p >= stat_alike.LEVEL else [(
+        "the fields differ by more than chance within a field: the interval holds for fields that are alike, and the "
+        "value can be too small, since fields worse than any of these bear the load of a longer time",
+        f"{load['fields']} fields, p {'< 0.0001' if p < 1e-4 else f'= {short(p, 2)}'}")]
+
+
+def start_exceeds(d):
+    """Does the start-up take more than the design value, or than the largest of the window where there is no value?"""
+    return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
+
+
+def _of_the_start(case, load):
+    """The same of the start-up, which is in no number of the load. While the ramp accelerates the body, its inertia
+    comes on top of ice and drag, and a longer ramp takes less; a peak at another time may have any cause."""
+    found, d = load["start_up"], load["design"]
+    if not start_exceeds(d | {"start_up": found, "largest": load["largest"]}):
+        return []
+    than = "the design value" if "value" in d else "the largest value of the window"
+    words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
+    ramp = case.ramp if case else 0.0
+    if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
+        inertia = f", of which inertia {quantity(found['inertia'], load['units'])}" if np.isfinite(
+            found.get("inertia", np.nan)) else ""
+        return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
+                 "accelerates the body; a longer ramp takes less", force + inertia)]
+    return [(f"the start, which is left out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
+
+
+def steps(e, rows):
+    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}). The
+    numbers of the summary are in it, which know the steps between samples and members without their folder; an earlier
+    program had those of a line without a second branch alone."""
+    out, labels = {}, {}
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                for name in [n for n in run.series_names if n.startswith(loads.TENSION)]:
+                    out[name] = np.fmax(out.get(name, np.nan), np.fmax.reduce(run[name], initial=-np.inf))
+                    labels[name] = run.label(name)
+        except RunError:
+            continue
+    out = {name: top for name, top in out.items() if np.isfinite(top)}
+    first, second = (f"{loads.TENSION}{k}" for k in (1, 2))
+    keys = {name: [f"window_series_{name}_{when}peak_n" for when in ("", "start_")] for name in (first, second)}
+    if set(out) <= {first}:
+        keys[first] += ["peak_line_tension_n", "start_peak_line_tension_n"]
+    for name, some in keys.items():
+        top = np.fmax.reduce(np.concatenate([_numbers(e, key, rows) for key in some]), initial=-np.inf)
+        if np.isfinite(top):
+            out[name] = max(top, out.get(name, top))
+    return out, labels
+
+
+def branches(e, rows, case, found):
+    """Of each branch of the line its breaking load (NaN: none), the largest tension of a step, start included, and the
+    design tension (NaN: none), N. found: statistics of the loads."""
+    largest, labels = steps(e, rows)
+    def row(name):
+        load = found.get(name)
+        return {"series": name, "label": labels.get(name, "line tension"), "largest_step": largest[name],
+                "breaking_load": case.breaking_loads.get(name, np.nan) if case else np.nan,
+                "design": load["design"].get("value", np.nan) if load else np.nan}
+    return [row(name) for name in sorted(largest)]
+
+
+def _of_the_line(e, rows, case, lines):
+    """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
+    a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
+    out, tows = [], e.tows(rows)
+    broken = [v for m in tows for v in e.events(m) if v["kind"] == loads.PARTED]
+    if broken:
+        parted, adrift = (loads.tows_with(e, tows, kind) for kind in (loads.PARTED, loads.ADRIFT))
+        each = [f"branch {k} in {sum(v['subject'] == k for v in broken)}"
+                for k in sorted({v["subject"] for v in broken} - {0})]
+        first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
+        out.append(("tow force and tension have no design value where a line parts: they are cut off there, or, where "
+                    "one branch of two holds, go on as those of another tow, whose body lies otherwise and can load "
+                    "that branch more; means and largest values are of each tow until nothing tows it, of a tension "
+                    "until its branch parts, and mix the two; for a design value simulate without breaking_load",
+                    ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
+                               *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
+                    + f"; in {adrift} of them nothing towed the body then"))
+    known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # of these it is said above
+    for words, key, some in (("the design tension is", "design", lines),
+                             ("the largest mean tension over one step, by which a line parts, is", "largest_step",
+                              [x for x in lines if x["series"] not in known])):
+        above = [f"{quantity(x['breaking_load'], 'N')} of the {x['label']}, which reaches {quantity(x[key], 'N')}"
+                 for x in some if x[key] > x["breaking_load"]]
+        if above:
+            out.append((f"{words} above the breaking load of the line", "; ".join(above)))
+    return out
+
+
+def _of_the_models(load):
+    """Do the two models of the tail agree?"""
+    over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
+    if not over or not blocks or not np.isfinite([over["level"], blocks["level"]]).all():
+        return []
+    low, high = over["level_95"]
+    if low <= blocks["level"] <= high:
+        return []
+    return [("peaks over a threshold and block maxima disagree on the tail",
+             f"{quantity(over['level'], load['units'])} and {quantity(blocks['level'], load['units'])}")]
+
+
+def statement(e, rows, c):
+    """What the design statement says of a condition c, a dict of bergtow statistics: {"tow", "tension", "branches",
+    "warnings", "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
+    there = np.flatnonzero(e.condition == c["index"])
+    towed = e.tows(there, excluded=False)  # those too whose line parted before the window, which are not among the rows
+    case, found = case_of(e, towed), c["loads"]
+    tow, lines = found.get("tow_force"), branches(e, towed, case, found)
+    tensions = [(load["design"], load) for load in found.values()
+                if load["needs"] in loads.LINE and "value" in load["design"]]
+    worst = max(tensions, key=lambda found: found[0]["value"], default=None)
+    # a branch without a value may bear more than the one that has one
+    if worst and any(load["largest"] > worst[0]["value"] for load in found.values()
+                     if load["needs"] in loads.LINE and "value" not in load["design"]):
+        worst = None
+    warned = _of_the_case(e, rows, case, tow and tow["design"])
+    if not len(rows):
+        counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
+        warned = [("nothing is known of a condition without a member that is in the numbers", ", ".join(counts))]
+    elif tow is None:
+        left = c["loads_left_out"].get("tow_force")
+        warned.append(("no tow force that varies", left["why"]) if left else
+                      (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+                       "something is towed", ""))
+    else:
+        warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
+    for load in found.values() if len(rows) else ():
+        if load["needs"] in loads.LINE:  # what is said of the sample of the tow force holds here, too
+            said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
+            warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
+    warned = _of_the_line(e, there, case, lines) + warned
+    if c["without_bound"]["words"]:
+        warned = [("means, peaks and quantiles are at least those given, and there is no design value, since nothing "
+                   "bounds some loads: let ice give way (ice.rafting.kappa, ice.crushing.pressure)",
+                   c["without_bound"]["words"])] + warned
+    return {
+        "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
+                        "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
+                        "mean_95": tow["mean"]["interval_95"],
+                        "largest": tow["largest"], "start_up": tow["start_up"]},
+        "speed": speed_made_good(e, rows),
+        "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"]},
+        "warnings": [{"what": what, "detail": detail} for what, detail in warned], "branches": lines,
+        "breaking_load": case.breaking_load if case else np.nan,
+        "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
+    }
+
+
+def _moved(e, case):
+    """What moves water and air, in words: "no current", or what the case says of it, where the study does not vary it.
+    A value without its current holds for another speed through the water than that of the tow."""
+    for words, keys in STILL.items():
+        there = [key for key in keys if case.texts.get(key, "none").split(" ")[0] not in ("0", "none")]
+        if there:
+            for key in (key for key in there if key not in e.parameters):
+                text = case.texts[key]
+                yield f"{short_key(key).replace('.', ' ')} " + (
+                    text.rpartition("/")[2] if key.endswith("table") else in_short(text))
+        elif not any(key in e.parameters for key in keys):
+            yield words
+
+
+def _lead(e, case):
+    """The lead ahead of the body in words, none where the study varies whether there is one: ice that was removed or
+    cut is not that of the floes named here."""
+    mode, size = case.texts.get("lead.mode", "none"), case.texts.get("lead.floe_size", "")
+    if mode == "none" or "lead.mode" in e.parameters:
+        return []
+    sides = [f"{in_short(case.texts[key])} {word}" for key, word in (("lead.width", "wide"), ("lead.length", "long"))
+             if key in case.texts and key not in e.parameters]
+    pieces = "without floes" if mode == "channel" else "of pieces" if "lead.floe_size" in e.parameters else \
+        f"of pieces up to {in_short(size)}"
+    return [" ".join(["a lead", *" and ".join(sides).split(), pieces])]
+
+
+def _holds_for(e, case):
+    """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
+    if case is None:
+        return ""
+    said = [(case.texts[key], before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
+            for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters
+            and (key != "body.length" or case.texts.get("body.shape") != "polygon")]
+    return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)
+                      for value, before, behind in said] + _lead(e, case) + list(_moved(e, case)))

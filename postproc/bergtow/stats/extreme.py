@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: MIT
+"""Extremes of peaks or of a signal: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD),
+return levels with intervals.
+
+A field is a dict: time s [n] and peak [n], in order, start s, hours. The peaks are those of collisions, or all samples
+of a signal (stats/load.py): what follows is the same, since clusters count and not samples.
+
+A level z of return time T hours of tow is exceeded once in T hours on the average.
+    empirical        rate(z) = number of peaks above z / hours
+    block maxima     blocks of b hours, GEV G fitted to their largest peaks: z = G^-1(exp(-b/T))
+    over threshold   clusters of peaks above u come at the rate L a hour, and the excess of a cluster's largest peak
+                     is GPD of scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
+[Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
+Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
+A level that is exceeded with probability p in a tow of T hours is that of the return time T / -ln(1 - p), since
+clusters far up come like a Poisson process.
+
+Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stats/profile.py).
+With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
+tail itself, and the threshold, are assumed, and fields that are alike (stats/alike.py). Below a shape of -1/2 maximum
+likelihood is irregular [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak,
+and so are the levels; this is reported.
+
+A load that something limits - a thrust at the bollard pull - stays at its largest value. Such a sample has no tail, and
+is refused in words. Values that differ by rounding alone are the same (TIE): in a moving mean of such a signal they
+differ by some 1e-14 of it, and a tail would be fitted to that.
+"""
+import numpy as np
+import scipy
+
+from bergtow.stats import fit as stat_fit
+from bergtow.stats import profile as stat_profile
+
+LEAST_EXCESSES = 30
+LEAST_BLOCKS = 20
+SHARE = 0.1          # of the peaks above the threshold, or more, until there are LEAST_EXCESSES clusters
+IRREGULAR = -0.5     # shape below which the likelihood is irregular
+EMPTY = 0.05         # share of blocks without a peak above which there is no GEV
+RESAMPLES = 199       # of the p-values
+TIE = 1e-9           # of the largest value: what differs by less is the same
+SATURATED = 0.1      # share of the clusters at one largest value from which on it is a limit, and the excesses no GPD
+
+
+def tie(peak):
+    """What peaks that are the same may differ by."""
+    return TIE * float(np.abs(peak).max(initial=0.0))
+
+
+def exceeds(peak, level):
+    """[n] of bool: is a peak above the level by more than rounding?"""
+    return peak > level + tie(peak)
+
+
+def commonest(values):
+    """(the value that most of these are but for rounding, how many)."""
+    x = np.sort(values)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(x) > tie(x)]))
+    counts = np.diff([*starts, len(x)])
+    k = int(np.argmax(counts))
+    return float(x[starts[k]]), int(counts[k])
+
+
+def saturated(values, what):
+    """Why values are no sample of a tail: SATURATED of them are the largest; "" where not. what: they, in words."""
+    top = values.max(initial=-np.inf)
+    there = int(np.sum(values >= top - tie(values)))
+    return f"saturated at {top:.4g} N, which {there} of {len(values)} {what} reach and none exceeds" \
+        if there > max(1, SATURATED * len(values)) else ""
+
+
+def gpd(excess):
+    """(scale, shape) of maximum likelihood, shape > stat_fit.LEAST_SHAPE.
+
+    With t = shape/scale the likelihood's best shape is mean ln(1 + t y), which leaves one unknown [Grimshaw 1993,
+    Technometrics 35]; it is searched on a grid, since there can be several maxima, and then refined.
+    """
+    y = np.asarray(excess, dtype=float)
+    unit = y.mean()
+    y = y / unit
+    def shape_of(t):
+        return np.mean(np.log1p(np.multiply.outer(t, y)), axis=-1)
+    def minus_likelihood(t):
+        t = np.asarray(t, dtype=float)
+        small = np.abs(t) < 1e-8
+        shape = np.where(small, 1.0, shape_of(np.where(small, 1.0, t)))
+        # t = 0: exponential of mean 1
+        value = np.where(small, 1.0, np.log(shape / np.where(small, 1.0, t)) + shape + 1)
+        return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), 1e6, value)  # finite: the search takes differences
+    low = -1 / y.max()
+    t = np.concatenate([low * (1 - np.geomspace(1e-6, 1, 120)), np.geomspace(1e-6, 50, 120)])
+    t.sort()
+    values = minus_likelihood(t)
+    k = int(np.argmin(values))
+    ends = t[max(k - 1, 0)], t[min(k + 1, len(t) - 1)]
+    best = scipy.optimize.minimize_scalar(minus_likelihood, bounds=ends, method="bounded", options={"xatol": 1e-9}).x
+    if minus_likelihood(best) > values[k]:
+        best = t[k]
+    shape = float(shape_of(best))
+    scale = shape / best if abs(best) > 1e-8 else 1.0
+    return unit * float(scale), shape
+
+
+def clusters(time, peak, threshold, gap):
+    """Largest peak of each cluster above the threshold; a cluster ends where none follows within the gap."""
+    above = exceeds(peak, threshold)
+    t, p = time[above], peak[above]
+    if not len(t):
+        return p
+    order = np.argsort(t, kind="stable")
+    t, p = t[order], p[order]
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(t) > gap]))
+    return np.maximum.reduceat(p, starts)
+
+
+def block_maxima(time, peak, start, hours, blocks):
+    """Largest peak of each of so many equal blocks of a field, NaN where a block has none."""
+    k = np.clip(((time - start) / (3600 * hours) * blocks).astype(int), 0, blocks - 1)
+    out = np.full(blocks, np.nan)
+    for i in range(blocks):
+        if (k == i).any():
+            out[i] = peak[k == i].max()
+    return out
+
+
+def return_hours(probability, hours):
+    """Return time of the level that is exceeded with this probability in a tow of so many hours."""
+    return hours / -np.log1p(-probability)
+
+
+def _excesses(fields, threshold, gap):
+    return [clusters(f["time"], f["peak"], threshold, gap) - threshold for f in fields]
+
+
+def choose_threshold(fields, pooled, gap, clusters_wanted=None):
+    """The level that the share SHARE of the peaks exceeds, or lower, up to half of them, until there are LEAST_EXCESSES
+    clusters; None if there never are. clusters_wanted, for a signal: the highest level with so many, or that with the
+    most of them."""
+    ordered, wanted = np.sort(pooled)[::-1], clusters_wanted or LEAST_EXCESSES
+    count, best = max(0 if clusters_wanted else int(SHARE * len(pooled)), wanted), (0, -np.inf)
+    while count <= len(pooled) // 2:
+        threshold = float(ordered[count])
+        found = sum(len(y) for y in _excesses(fields, threshold, gap))
+        if found >= wanted:
+            return threshold
+        best = max(best, (found, threshold))
+        count = int((1.05 if clusters_wanted else 1.1) * count) + 1
+    return best[1] if best[0] >= LEAST_EXCESSES else None
+
+
+def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAMPLES, what="collisions",
+                   clusters_wanted=None):
+    """Peaks over a threshold as a dict; {"refused": why} where there are too few. what: the peaks, in words."""
+    pooled, hours = np.concatenate([f["peak"] for f in fields]), sum(f["hours"] for f in fields)
+    if threshold is None:
+        threshold = choose_threshold(fields, pooled, gap, clusters_wanted)
+        if threshold is None:
+            return {
+                "refused": saturated(pooled, what) or
+                           f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
+                           f"any threshold that half of them exceed at most; run longer, more fields, or a shorter "
+                           f"--gap"
+            }
+    each = _excesses(fields, threshold, gap)
+    excess, raw = np.concatenate(each), sum(int(np.sum(exceeds(f["peak"], threshold))) for f in fields)
+    if len(excess) < LEAST_EXCESSES:
+        return {
+            "refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
+                       f"fields, or choose a lower --threshold"
+        }
+    if why := saturated(threshold + excess, "clusters"):
+        return {"refused": why}
+    scale, shape = gpd(excess)
+    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape,
+                                        hours_of_levels)
+    def refit(y):
+        s, k = gpd(y)
+        return stat_fit.Frozen(scipy.stats.genpareto, k, scale=s)
+    frozen = stat_fit.Frozen(scipy.stats.genpareto, shape, scale=scale)
+    statistic = stat_fit.anderson_darling(excess, frozen.cdf)
+    return {
+        "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
+        "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
+        "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
+        "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
+                                    resamples), "interval": interval_note(len(fields)),
+        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
+                   for T, (z, ends) in zip(hours_of_levels, levels)]
+    }
+
+
+def interval_note(fields):
+    if fields < stat_profile.LEAST_FIELDS:
+        return "profile likelihood; scatter between fields left out: too few of them"
+    return "profile likelihood, widened by the scatter between fields that are alike"
+
+
+def gpd_minus_log_likelihood(log_scale, shape, y):
+    """Of excesses y [n]; log_scale and shape numbers."""
+    if not stat_fit.LEAST_SHAPE < shape < 10:
+        return np.inf
+    z = y * np.exp(-log_scale)
+    if abs(shape) < 1e-7:
+        return len(y) * log_scale + z.sum()
+    inside = 1 + shape * z
+    if len(y) and inside.min() <= 0:
+        return np.inf
+    return len(y) * log_scale + (1 + 1 / shape) * np.log(inside).sum()
+
+
+def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
+    """([(level, (low, high)) of each return time], (low, high) of the shape). each: excesses by field.
+
+    The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the
+    dispersion.
+    """
+    excess, unit, n = np.concatenate(each), scale, len(each)
+    y, total, hours = [x / unit for x in each], np.concatenate(each) / unit, np.asarray(hours, dtype=float)
+    rate = len(excess) / hours.sum()
+    best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted one), shape, ln rate
+    def by_field(theta):
+        return np.array([
+            gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
+            for x, h in zip(y, hours)
+        ])
+    def level(theta, T):
+        return np.exp(theta[0]) * growth(theta[1], np.exp(theta[2]) * T)
+    def alone(theta):
+        return np.sum(by_field(np.append(theta, best[2])))
+    levels = []
+    for T in hours_of_levels:
+        if rate * T <= 1:
+            levels.append((np.nan, (np.nan, np.nan)))
+            continue
+        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best)
+        share = rate_share(alone, by_field, lambda theta: level(theta, T), best)
+        z = level(best, T)
+        def profile(q, rest):
+            g = growth(rest[0], rate * T)
+            return gpd_minus_log_likelihood(np.log(q / g), rest[0], total) if q > 0 and g > 0 else np.inf
+        low, high = stat_profile.interval(profile, z, [shape], stat_profile.drop(n, c, share), 0.1 * z)
+        levels.append((threshold + unit * z, (threshold + unit * max(low, 0.0), threshold + unit * high)))
+    c = stat_profile.dispersion(lambda theta: by_field(np.append(theta, best[2])), lambda theta: theta[1], best[:2])
+    ends = stat_profile.interval(lambda q, rest: gpd_minus_log_likelihood(rest[0], q, total), shape, [0.0],
+                                 stat_profile.drop(n, c), 0.05)
+    return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
+
+
+def growth(shape, times):
+    """((L T)^k - 1)/k."""
+    return np.log(times) if abs(shape) < 1e-8 else np.expm1(shape * np.log(times)) / shape
+
+
+def rate_share(alone, by_field, level, best):
+    """Variance of the level with the error of the rate over that without it, by the likelihood."""
+    def variance(f, g, theta):
+        with np.errstate(invalid="ignore"):
+            information = stat_profile.gradient(lambda t: stat_profile.gradient(f, t), theta)
+        if not np.isfinite(information).all():
+            return np.nan
+        try:
+            return float(g @ np.linalg.solve(0.5 * (information + information.T), g))
+        except np.linalg.LinAlgError:
+            return np.nan
+    g = stat_profile.gradient(level, best)
+    share = variance(lambda t: np.sum(by_field(t)), g, best) / variance(alone, g[:2], best[:2])
+    return share if np.isfinite(share) and share >= 1 else 1.0
+
+
+SHORT = 0.5  # of the middle one of the fields by length: shorter ones do not set the length of the blocks
+
+
+def _blocks(fields, blocks):
+    """(maxima of the blocks of each field, hours of a block). Blocks are of one length: so many in the shortest of the
+    fields that are at least half as long as the middle one. What a field has beyond its whole blocks is left out, and
+    so are fields that have none."""
+    hours = np.array([f["hours"] for f in fields])
+    length, out = float(hours[hours >= SHORT * np.median(hours)].min()) / blocks, []
+    for f in fields:
+        count = int(f["hours"] / length + 0.01)
+        within = f["time"] <= f["start"] + 3600 * count * length * (1 + 1e-9)
+        out.append(block_maxima(f["time"][within], f["peak"][within], f["start"], count * length, count))
+    return out, length
+
+
+def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a collision"):
+    """Block maxima as a dict; {"refused": why} where there are too few, or blocks without a peak. blocks: of a field;
+    without it so many that there are LEAST_BLOCKS. what: a peak, in words."""
+    n = len(fields)
+    each, length = _blocks(fields, blocks or int(np.ceil(LEAST_BLOCKS / n)))
+    maxima = np.concatenate(each)
+    empty = np.isnan(maxima)
+    if len(maxima) < LEAST_BLOCKS:
+        return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
+    if empty.mean() > EMPTY:
+        return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without {what}; lower --blocks, or run longer"}
+    if why := saturated(maxima[~empty], "blocks"):
+        return {"refused": why}
+    value, same = commonest(maxima[~empty])
+    if same > max(1, EMPTY * len(maxima)):
+        return {"refused": f"the largest of {same} of {len(maxima)} blocks is the same, {value:.4g} N: no GEV"}
+    total = len(maxima) * length
+    there = [x[np.isfinite(x)] for x in each]
+    fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
+    if fitted.refused:
+        return {"refused": f"block maxima: {fitted.refused}"}
+    location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
+    levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in hours_of_levels])
+    return {
+        "blocks": len(maxima), "block_hours": length, "hours": total, "without_block": sum(len(x) == 0 for x in each),
+        "empty": int(empty.sum()), "location": location, "scale": scale,
+        "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
+        "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
+        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}
+                   for T, (z, ends) in zip(hours_of_levels, levels)]
+    }
+
+
+def gev_intervals(each, location, scale, shape, shares):
+    """([(level, (low, high)) exceeded once in 1/share blocks], (low, high) of the shape). each: block maxima by
+    field."""
+    y, n = [(x - location) / scale for x in each], len(each)
+    total, best = np.concatenate(y), np.array([0.0, 0.0, shape])
+    def by_field(theta):
+        return np.array([stat_fit.gev_minus_log_likelihood(theta, x) if len(x) else 0.0 for x in y])
+    def height(k, share):
+        """(level - location)/scale: (share^-k - 1)/k, since -ln exp(-share) = share."""
+        return -np.log(share) if abs(k) < 1e-8 else np.expm1(-k * np.log(share)) / k
+    levels = []
+    for share in shares:
+        z = height(shape, share)
+        def profile(q, rest):
+            return stat_fit.gev_minus_log_likelihood(
+                (q - np.exp(rest[0]) * height(rest[1], share), rest[0], rest[1]), total) if rest[1] < 10 else np.inf
+        c = stat_profile.dispersion(by_field, lambda t: t[0] + np.exp(t[1]) * height(t[2], share), best)
+        low, high = stat_profile.interval(profile, z, [0.0, shape], stat_profile.drop(n, c), 0.2 * (1 + abs(z)))
+        levels.append((location + scale * z, (location + scale * low, location + scale * high)))
+    c = stat_profile.dispersion(by_field, lambda t: t[2], best)
+    ends = stat_profile.interval(lambda q, rest: stat_fit.gev_minus_log_likelihood((rest[0], rest[1], q), total), shape,
+                                 [0.0, 0.0], stat_profile.drop(n, c), 0.05)
+    return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
+
+
+def exceedance(fields):
+    """(peaks N, largest first, times a hour that each is reached) of all fields together."""
+    peaks = np.sort(np.concatenate([f["peak"] for f in fields]))[::-1] if fields else np.zeros(0)
+    return peaks, np.arange(1, len(peaks) + 1) / max(sum(f["hours"] for f in fields), 1e-300)

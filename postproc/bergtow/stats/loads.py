@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: MIT
+"""The loads of an ensemble that something is designed for, member by member and condition by condition.
+
+    tow_force, ice_resistance     and every series that the program registers as a load of line or vessel
+    floe_force                    largest force of one floe on the hull in a step, or the peak of a collision
+    panel_load                    load on that panel of the hull where it is largest (cases with output.panels)
+
+Names, units and labels come from the members' files. All but floe_force are filtered (stats/load.py); that one is
+local, acts for as long as a collision does, and is what it is by impact.conversion, which is named.
+
+A line that parts. The tension of a branch is taken until it parts, all other loads until no branch is left: what comes
+after is no tow, and its zeros would be in every number. Neither tow force nor tension exceeds what the branches bear
+then, and every load ends where it is largest, so where a line parted in any tow there is no tail, and no design value.
+A lower bound in its place was rejected: it stands where a design value stands, and is below the breaking load.
+
+Time scale. 30 s, unless it is given: over so long a time the readings of a bollard pull trial are averaged for the
+largest static pull, while the continuous pull, by which a towing vessel is chosen, is a mean of 10 min [IMO 1998,
+MSC/Circ.884, Guidelines for safe ocean towing]. So a tow force of 30 s is one that the vessel must hold by thrust and
+not by its inertia. Shorter loads reach neither: a berg of 80 m on 600 m of line has a period of minutes. At model scale
+Froude's law has it shorter by the root of the length scale (estimate.length_scale), as it has the hours of a tow.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+
+from bergtow.arguments import above_zero, share
+from bergtow.errors import RunError
+from bergtow.result.run import Run, least
+from bergtow.stats import alike as stat_alike
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import load as stat_load
+from bergtow.table import quantity
+
+TIME_SCALE = 30.0     # s, full scale
+TOW_HOURS = 24.0      # h, full scale
+PROBABILITY = 0.05
+ALWAYS = ("tow_force", "ice_resistance")
+ROLE = "load"
+LOCAL = ("floe_force", "panel_load")  # on a part of the hull
+LINE = ("line", "bridle")             # what the tension of a branch needs
+TENSION = "line_tension_"             # and the number of the branch
+PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
+TAILS = ("over_threshold", "block_maxima")
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a load is, as the files tell it."""
+
+    name: str
+    label: str
+    units: str
+    description: str
+    needs: str = ""       #: what a run must have for it, as the registry names it
+    refused: str = ""     #: why there are no statistics of it
+    conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
+
+
+def filler(run):
+    """What makes a load of a series: of a run with steps without a solution `least`; NaN of another kind stays."""
+    return least if run.number("no_load_steps") > 0 else np.asarray
+
+
+def _floe_force(run):
+    """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
+    if not {"largest_quasi_static_load", "impact_peak"} <= set(run.series_names):
+        return None
+    push, peak = run["largest_quasi_static_load"], run["impact_peak"]
+    if not (np.isfinite(push).any() and np.isfinite(peak).any()):
+        return None
+    conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
+    push = filler(run)(push)
+    return Load("floe_force", "force of one floe", run.units("largest_quasi_static_load"),
+                "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
+                "collision", conversion=conversion,
+                refused=f"of every {steps} steps the largest alone was kept; set output.sample_every: 1"
+                if steps > 1 else ""), np.maximum(push, peak)
+
+
+def _panel_load(run):
+    """(Load, values [n, panels]), None where a run has no series of them."""
+    if "load" not in run.panel_series:
+        return None
+    return Load("panel_load", "load on one hull panel", run.panel_series["units"],
+                "sum of the normal forces on a panel of the hull, the largest of all panels"), run.panel_series["load"]
+
+
+def of_run(run):
+    """[(Load, values)] of a run and the times of the values."""
+    out, filled = [], filler(run)
+    for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
+        if np.isfinite(run[name]).any():
+            out.append((Load(name, run.label(name), run.units(name), run.description(name),
+                             run.attribute(name, "needs")), filled(run[name])))
+    return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
+
+
+def of_member(e, m):
+    """The same of a member of an ensemble; of one without its folder, what ensemble.h5 holds."""
+    try:
+        with Run(e.folder(m)) as run:
+            return of_run(run)
+    except RunError:
+        there = [name for name in ALWAYS if e.has(name)]
+        return [(Load(name, *e.described(name)), e.series(m, name)[1]) for name in there], e.series(m)[0]
+
+
+def scaling(e, rows):
+    """Time at full scale / time in a condition: the root of its length scale."""
+    return e.scaling(rows[0]) if len(rows) else 1.0
+
+
+def until(e, m, name):
+    """Time up to which a load of a member is that of a tow, s: a tension until its branch parts, any other load until
+    no branch is left."""
+    return min((v["time_s"] for v in e.events(m) if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
+               default=e.adrift(m))
+
+
+def tows_with(e, rows, *kinds):
+    """How many of the members' tows had an event of these kinds."""
+    return sum(any(v["kind"] in kinds for v in e.events(m)) for m in rows)
+
+
+def cut_off(e, rows, load):
+    """Why a load has no tail, "" where it may have one: steps without a solution, or lines that parted where that
+    matters to it. Tows that are excluded count: those that are left are the ones that the line survived."""
+    through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
+    if without := e.without_bound(rows):
+        return str(without)
+    n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
+    return f"the line parted in {n} of {len(tows)} tows" if n else ""
+
+
+def bounded(found, without):
+    """Names of the loads of a condition that a line bounds, even in steps without a solution: tensions, and the tow
+    force where there are any. None of them where tows ended for it: which are left depends on their loads."""
+    tensions = {name for name, x in found.items() if x["needs"] in LINE}
+    return set() if without.ended or not tensions else tensions | {ALWAYS[0]}
+
+
+def in_window(e, m, time_scale):
+    """[(Load, field, start)] of a member: every load in the window, as long as it is that of a tow, and before it, as
+    stat_load.field_of and start_up have them, None where there is none."""
+    out, (some, time) = [], of_member(e, m)
+    start, end = e.window(m, time)
+    for load, x in some if np.isfinite([start, end]).all() else []:
+        scale, last = 0.0 if load.conversion else time_scale, min(end, until(e, m, load.name))
+        out.append((load, stat_load.field_of(time, x, start, last, scale),
+                    stat_load.start_up(time, x, start, last, scale)))
+    return out
+
+
+def gather(e, rows, options):
+    """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of
+    makes them, the largest start-up of all its tows, also of those whose line parts in it, and the loads that are left
+    out: those that are refused, that are constant over all fields together, and whose collisions the members convert in
+    different ways. A field in which a load is constant is a field like any other: ice that the
+    tow does not meet is a load of zero, and its hours count. options: time_scale (None: the default)."""
+    out, starts, why = {}, {}, {}
+    time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
+    for m in e.tows(rows, excluded=False):
+        for load, field, start in in_window(e, m, time_scale):
+            if load.refused:
+                why[load.name] = {"label": load.label, "why": load.refused}
+                continue
+            if start is not None:
+                starts.setdefault(load.name, []).append(start | {"member": int(m)})
+            if field is not None and m in rows:
+                out.setdefault(load.name, []).append((load, field | {"member": int(m)}))
+    found = {}
+    for name, some in out.items():
+        load, fields = some[0][0], [field for _, field in some]
+        if len({load.conversion for load, _ in some}) > 1:
+            why[name] = {"label": load.label, "why": "members convert its collisions in different ways"}
+        elif stat_load.constant(fields):
+            why[name] = {"label": load.label, "why": f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all "
+                                                     f"{len(fields)} fields"}
+        else:
+            found[name] = load, fields, max(starts.get(name, []), key=lambda s: s["largest"], default=None)
+    return found, why
+
+
+def _design(found, hours, total):
+    """The level of the last return time by peaks over a threshold, or by block maxima where there are too few."""
+    for kind, model in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
+        level = found[kind].get("levels", [{"level": np.nan}])[-1]
+        if np.isfinite(level["level"]):
+            return {
+                "value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
+                "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),
+                "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]
+            }
+    return {
+        "refused": "; ".join(dict.fromkeys(found[kind].get("refused", "no level") for kind in TAILS)),
+        "return_hours": hours
+    }
+
+
+def statistics(e, rows, options, gathered=None):
+    """{name: all statistics of a load} of the members of a condition; options: time_scale and tow_hours (None: the
+    default), probability, hours, resamples. gathered: what gather() found, where that is known."""
+    gathered = gather(e, rows, options)[0] if gathered is None else gathered
+    tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
+    design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
+    for name, (load, fields, start) in gathered.items():
+        gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
+        start_up = start and {what: start[what] for what in ("largest", "time_s")}
+        if start and name == ALWAYS[0]:
+            start_up |= {"inertia": _inertia(e, start["member"], start["time_s"], start["scale"])}
+        why = cut_off(e, rows, load)
+        found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
+            fields, gap, [*options.hours, design_hours], options.resamples)
+        out[name] = {
+            "label": load.label, "units": load.units, "description": load.description, "needs": load.needs,
+            "conversion": load.conversion,
+            "time_scale_s": float(np.median([f["scale"] for f in fields])),
+            "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
+            "fields": len(fields), "members": len(e.tows(rows, excluded=False)), "hours": total, "gap_s": gap,
+            **stat_load.summary(fields),
+            "alike_p": stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
+            "start_up": start_up,
+            "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
+                "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)
+            }
+        }
+    return out
+
+
+def _inertia(e, m, end, scale):
+    """Mean of the inertia of a member's body over the time scale before `end`, N; NaN where its folder is not there."""
+    try:
+        with Run(e.folder(m)) as run:
+            some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
+            return float(run["inertia_force"][some].mean()) if "inertia_force" in run and some.any() else np.nan
+    except RunError:
+        return np.nan
+
+
+def panels(e, rows):
+    """Means over the window and largest step means of every panel of the hull, over the fields that were towed to the
+    end of it: {"mean", "mean_95", "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their
+    middles from the body's x axis towards y, "units", "fields"}; None where members have none, or unlike numbers of
+    them."""
+    mean, largest, units, middle = [], [], "", None
+    for m in [m for m in rows if not e.cut(m)]:
+        try:
+            with Run(e.folder(m)) as run:
+                found, units = run.panels, run.panel_series["units"]
+        except RunError:
+            continue
+        middle = found["middle"] if middle is None else middle
+        mean.append(found["mean_load"])
+        largest.append(found["max_load"])
+    if not mean or len({len(x) for x in mean}) > 1 or not np.isfinite(mean).all():
+        return None
+    def over(x):
+        return np.array([stat_load.mean_over_fields(column, 0.0) for column in np.array(x).T])
+    return {
+        "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
+        "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
+        "mean_of_largest_95": over(largest),
+        "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360
+    }
+
+
+def add_load_options(p):
+    """Options of the statistics of loads."""
+    p.add_argument("--time-scale",
+                   type=above_zero,
+                   metavar="S",
+                   help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
+                        "scale: stats/loads.py says why)")
+    p.add_argument("--tow-hours",
+                   type=above_zero,
+                   metavar="H",
+                   help="length of the tow that the design values are for, h (default: 24 at full scale)")
+    p.add_argument("--probability",
+                   type=share,
+                   default=PROBABILITY,
+                   metavar="P",
+                   help="with which the design value is exceeded in such a tow (default %(default)s)")

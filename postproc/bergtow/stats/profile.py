@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Intervals of a quantity by its profile likelihood, widened for values that depend on each other within a field.
+
+With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval holds the q with
+    2 (l(q^) - l_p(q)) <= max(k, K c),      c = g V_s g / g V_m g,
+K the square of Student's t quantile of F - 1 degrees of freedom, k of that of F - 1 + WORTH.
+g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the
+squared scores of the F fields: c is about 1 where the values of a field are independent of each other and of the field,
+and larger where they are not [Chandler & Bate 2007, Biometrika 94]. c is known as well as F fields tell it. The
+likelihood itself is known better, by all their values, but a model of the tail holds a little less than it says: WORTH
+is chosen on series whose extremes are known (README.md). With K for both, up to 99 to 100 % of the intervals of 5 to 8
+fields held the level; with the normal quantile for k, as few as 87 % of those of 8.
+Follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals of
+exponential tails from 8 and 20 fields they covered 65 to 82 % and 75 to 80 %, since the shape of a short sample is low
+and its resamples are lower still.
+
+J is the scatter of the fields drawn. Where fields differ in level, those that bear the level of a longer time are worse
+than any of these, and the interval does not hold it as often as it says (stats/alike.py; README.md has numbers).
+"""
+import numpy as np
+import scipy
+
+LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: the likelihood alone, by the normal quantile
+WORTH = 3         # degrees of freedom that the likelihood counts for beside the fields
+STEPS = 60        # doublings of the distance before an interval counts as open
+BISECTIONS = 14
+SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of the order of one
+
+
+def gradient(f, theta, step=1e-4):
+    """d f / d theta, f scalar or [F]: [k] or [k, F]."""
+    out = []
+    for i in range(len(theta)):
+        d = np.zeros(len(theta))
+        d[i] = step
+        out.append((np.asarray(f(theta + d)) - np.asarray(f(theta - d))) / (2 * step))
+    return np.array(out)
+
+
+def dispersion(minus_log_likelihoods, quantity, theta):
+    """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
+    theta = np.asarray(theta, dtype=float)
+    # at the edge of what is possible there is no gradient: not finite, and found out below
+    with np.errstate(invalid="ignore"):
+        scores = gradient(minus_log_likelihoods, theta)
+        information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)
+        g = gradient(quantity, theta)
+    fields = scores.shape[1]
+    if fields < LEAST_FIELDS or not np.isfinite(information).all():
+        return 1.0
+    try:
+        a = np.linalg.solve(0.5 * (information + information.T), g)
+    except np.linalg.LinAlgError:
+        return 1.0
+    model, robust = g @ a, np.sum((a @ scores) ** 2) * fields / (fields - 1)
+    return float(robust / model) if np.isfinite([model, robust]).all() and model > 0 else 1.0
+
+
+def drop(fields, c, share=1.0, level=0.95):
+    """Fall of the log-likelihood at the ends of the interval. c: of `dispersion`; share: variance with what the profile
+    holds fixed over that without."""
+    def squared(quantile):
+        return quantile(0.5 + level / 2) ** 2
+    if fields < LEAST_FIELDS:
+        return 0.5 * share * squared(scipy.stats.norm.ppf)
+    return 0.5 * share * max(squared(scipy.stats.t(fields - 1 + WORTH).ppf), c * squared(scipy.stats.t(fields - 1).ppf))
+
+
+def interval(minus_log_likelihood, best, rest, fall, first):
+    """(low, high) of a quantity: where min over rest of minus_log_likelihood(q, rest) has risen by `fall` above its
+    value at q = best.
+
+    first: first step away from best. An end that is not found is infinite.
+    """
+    least = minus_log_likelihood(best, rest)
+    def rise(q, start):
+        # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values
+        # are very unlikely ones: the search takes differences.
+        simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
+        found = scipy.optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
+                                        options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400,
+                                                 "initial_simplex": simplex})
+        return found.fun - least - fall, found.x
+    ends = []
+    for sign in (-1, 1):
+        inner, outer, start = best, best, np.asarray(rest, dtype=float)
+        step, value = first, -fall
+        for _ in range(STEPS):
+            outer = inner + sign * step
+            value, found = rise(outer, start)
+            if value > 0 or not np.isfinite(value):
+                break
+            inner, start, step = outer, found, 1.6 * step
+        if value <= 0:
+            ends.append(sign * np.inf)
+            continue
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (inner + outer)
+            value, found = rise(middle, start)
+            if value > 0 or not np.isfinite(value):
+                outer = middle
+            else:
+                inner, start = middle, found
+        ends.append(0.5 * (inner + outer))
+    return ends[0], ends[1]

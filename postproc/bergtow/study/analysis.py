@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""The analyses converge, budget and capability: their options, and the result of each as NAME.json in a folder,
+NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
+
+The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
+`found` as it comes back from the file, where what is not finite is None.
+"""
+import os
+
+from bergtow import arguments, writing
+from bergtow.arguments import above_zero
+from bergtow.errors import RunError
+from bergtow.text import budget as budget_text
+from bergtow.text import capability as capability_text
+from bergtow.text import converge as converge_text
+
+#: heading and words, in the order of a report
+KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty budget", budget_text),
+         "capability": ("Towing capability", capability_text)}
+
+
+# ---- command line
+
+
+def add_options(p, minutes):
+    """--budget, --set, --jobs, --force."""
+    p.add_argument("--budget", type=above_zero, default=minutes, metavar="MIN",
+                   help=f"wall time, min (default {minutes:g}); the same call goes on")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
+    p.add_argument("--jobs", type=_jobs, default=len(os.sched_getaffinity(0)), metavar="N",
+                   help="runs at a time (default: the cores)")
+    arguments.add_force(p)
+
+
+def _jobs(text):
+    return max(1, int(text))
+
+
+def _files(name, folder):
+    return [folder / f"{name}{end}" for end in ((".json", ".png") if hasattr(KINDS[name][1], "figure") else (".json",))]
+
+
+def begin(name, file, kind, folder, force):
+    """Is there a case or study, and a place for what is found? Errors: RunError."""
+    if not file.exists():
+        raise RunError(file, "no such file", f"name a {kind} file")
+    for path in _files(name, folder):
+        writing.may_write(path, force)
+
+
+def keep(name, found, folder, force):
+    """Write what was found and say it. Errors: RunError."""
+    words, found = KINDS[name][1], writing.plain(found)
+    data, *pictures = _files(name, folder)
+    writing.write_json(found, data, force)
+    print(words.text(found))
+    print()
+    for picture in pictures:
+        writing.save(words.figure(found), picture, force)
+    print(data)
+
+
+# ---- reports
+
+
+def also(folders):
+    """Folders named by --also hold what they are named for. Errors: RunError."""
+    for folder in folders:
+        if not any((folder / f"{name}.json").is_file() for name in KINDS):
+            raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
+                           "name the folder of bergtow converge, budget or capability with --also")
+
+
+def chapter(name, found):
+    """{"heading", "markdown", "figure"} of what a command found, for a report; figure is a function without arguments,
+    or None. found["doubt"]: why it is not of what the report is of."""
+    heading, words = KINDS[name]
+    draw = getattr(words, "figure", None)
+    warned = f"WARNING: {found['doubt'][0].upper()}{found['doubt'][1:]}.\n\n" if found.get("doubt") else ""
+    return {"heading": heading, "markdown": warned + words.text(found, True), "figure": draw and (lambda: draw(found))}

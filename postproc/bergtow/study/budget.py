@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""The uncertainty budget of a study whose parameters are drawn from their distributions: mean, scatter of the fields,
+of the parameters, of each of them, of the computation.
+
+    bergtow budget STUDY.yml -o DIR --budget 15        runs the members that are left, then DIR/budget.json, budget.png
+
+The study is a Latin hypercube (`sampling`, `samples`) with fields of its own for each condition, two or more of them
+(`repeats`) to tell fields from parameters. What the computation adds is not varied here: it is that of `bergtow
+converge` on the base case (`--converge FILE`, or converge.json in DIR), from the value on that the study runs with.
+"""
+import re
+from collections import Counter
+from pathlib import Path
+
+from bergtow._program import program_path
+from bergtow.errors import CASE, SIGNAL, USAGE, RunError
+from bergtow.result import compared, findings
+from bergtow.result.members import FAILED, FINISHED, WAITING, Members, listed
+from bergtow.stats import loads
+from bergtow.stats import load as stat_load
+from bergtow.stats import variance as stat_budget
+from bergtow.study import analysis
+from bergtow.study.runs import run_members
+from bergtow.table import hours_text
+
+import numpy as np
+
+BUDGET = 15.0  # min
+BOUNDED = "mean_drag", "mean_line", "peak_line", "mean_vessel"  # numbers of the summary that a lock leaves alone
+OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
+
+
+def assumed(e):
+    """{parameter: distribution and source as the study says them}."""
+    out = {}
+    for key, words in e.assumed.items():
+        out[key] = dict(words)
+        if e.units[key] not in ("", "1") and out[key]["distribution"]:
+            out[key]["distribution"] += f" {e.units[key]}"
+        if not out[key]["distribution"]:
+            out[key]["distribution"] = ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
+    return out
+
+
+def quantile(e, rows, name, share):
+    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as stats/loads.py has it, the
+    largest value at 100 %; NaN where a member has no window that is long enough. Errors: RunError where a line that
+    parted cuts the load off, or where it has no statistics."""
+    scale, out, known = loads.TIME_SCALE / loads.scaling(e, rows), np.full(len(rows), np.nan), None
+    for k, m in enumerate(rows):
+        for load, field, _ in loads.in_window(e, m, scale):
+            if load.name == name and (why := load.refused or loads.cut_off(e, rows, load)):
+                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it anew")
+            if load.name == name and field is not None:
+                known, out[k] = load, np.percentile(field["peak"], share)
+    if known is None:
+        return None, out
+    hours = np.nanmedian([e.number("window_end_s", m) - e.number("window_start_s", m) for m in rows]) / 3600
+    words = f"largest {known.label} of a tow, within {hours_text(hours)}" if share == 100 else \
+        f"{known.label} that {100 - share:g} % of the time exceeds"
+    words += f"; a quasi-static load is the mean over a step, the peak of a collision is by {known.conversion}" \
+        if known.conversion else f", as the moving mean over {scale:.3g} s"
+    return {"units": known.units, "description": words}, out
+
+
+def numbers(e, of):
+    """(its units and description, rows, values) of a number of the summary, or of LOAD:SHARE. Errors: RunError."""
+    if load := re.fullmatch(r"(\w+):(\d+(?:\.\d+)?)", of):
+        share = float(load[2])
+        if not 0 < share <= 100:
+            raise RunError(of, "a quantile lies above 0 and at most at 100 %", "write it as tow_force:99", USAGE)
+        meaning, values = quantile(e, e.used, load[1], share)
+        if meaning is None:
+            raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
+                           "name another with --of, or run longer")
+    elif of in e.summary:
+        whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # what comes after a tow is in it
+        meaning, values = e.meaning.get(of, {}), (e.mean if of == OF[0] else whole)[e.used]
+    else:
+        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE",
+                       USAGE)
+    there = np.isfinite(values)
+    return meaning, e.used[there], values[there]
+
+
+def those_there(e):
+    """The numbers of OF that an ensemble has; of a quantile that is left out the reason is printed."""
+    out = [OF[0]]
+    for of in OF[1:]:
+        try:
+            numbers(e, of)
+            out.append(of)
+        except RunError as error:
+            print(f"bergtow budget: left out: {of}: {error.reason}")
+    return out
+
+
+def numerics(e, converge, texts):
+    """What the computation adds to means of an ensemble, as stat_budget.budget takes it; None where nothing is known.
+    Refused where converge.json is of another case."""
+    if converge is None:
+        return None
+    if why := compared.misfit(converge, texts):
+        return {"refused": f"converge.json is of another case, {why}; run `bergtow converge` on the base case"}
+    return stat_budget.relative_numerics(converge["rows"], compared.values(e, texts))
+
+
+def fair(e):
+    """Rows of a fair sample of a study that may have been cut short: of each repeat the conditions up to the first that
+    is still to come. Conditions stand in the order of the hypercube, which is random; which of those beyond are done
+    depends on how long they take, and so on the values that they have."""
+    rows = []
+    for r in np.unique(e.repeat):
+        some = np.flatnonzero(e.repeat == r)
+        some = some[np.argsort(e.condition[some])]
+        rows += list(some[:np.argmax(np.append(e.status[some] == WAITING, True))])
+    return np.array(rows, dtype=int)
+
+
+def without_intervals(found):
+    """The same with no interval known."""
+    if not isinstance(found, dict):
+        return found
+    return {k: (np.nan, np.nan) if k.endswith("_95") else without_intervals(v) for k, v in found.items()}
+
+
+def of_ensemble(e, of=OF[0], computed=None):
+    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of the mean ice resistance
+    alone: in per cent of it, which says nothing of a number with drag or inertia in it. Where
+    members of the sample failed, or have no such number, nobody knows which values are missing, and there are no
+    intervals. Errors: RunError."""
+    if "sampling: latin-hypercube" not in e.study:
+        raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
+                       CASE)
+    if "fields: common" in e.study:
+        raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
+                       CASE)
+    meaning, done, values = numbers(e, of)
+    if (without := e.without_bound(np.arange(e.n))) and not of.startswith(BOUNDED):
+        raise RunError(e.file, f"has no budget of {of}: {without}", "let ice give way (ice.rafting.kappa, "
+                       "ice.crushing.pressure), or name another number with --of", CASE)
+    sample = fair(e)
+    there = np.isin(done, sample)
+    rows, values = done[there], values[there]
+    lacking = [e.name[m] for m in sample if m not in rows and e.status[m] == FINISHED and e.name[m] not in e.copies]
+    found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
+                               computed if of == OF[0] else None)
+    if "refused" in found:
+        raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further",
+                       SIGNAL)
+    units = meaning.get("units") or ("N" if of.endswith("_n") else "")
+    if lacking or np.any(e.status[sample] == FAILED):
+        found = without_intervals(found)
+    return found | {"title": e.title, "of": of, "units": str(units),
+                    "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n,
+                    "waiting": int(np.sum(e.status == WAITING)), "left_out": len(done) - len(rows),
+                    "failed": e.reasons(FAILED), "failed_beyond": [e.name[m] for m in np.flatnonzero(
+                        e.status == FAILED) if m not in sample], "without_number": lacking, "copies": e.copies,
+                    "doubts": dict(Counter(kind for m in rows for kind in e.doubts(m))),
+                    "doubtful": sum(bool(e.doubts(m)) for m in rows)}
+
+
+def of_all(e, some, converge):
+    """The budget of the first number, with those of the others as "more"; budget.json."""
+    texts = compared.cases(e)
+    computed = numerics(e, converge, texts)
+    first, *more = (of_ensemble(e, of, computed) for of in some)
+    return first | {"more": more, "values": compared.common(texts), "builds": e.builds, **compared.state(e)}
+
+
+def read_converge(path, folder):
+    if path is None:
+        return findings.read("converge", folder)
+    found = findings.read("converge", path)
+    if not isinstance(found, dict) or "rows" not in found:
+        raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
+    return found
+
+
+def options(p):
+    p.add_argument("study", metavar="STUDY.yml", type=Path)
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
+    p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
+                   "quantile of a load in %%, 100 for the largest value of a tow, as the moving mean over its time "
+                   f"scale; may be repeated (default: {', '.join(OF)})")
+    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
+                   "computation adds")
+    analysis.add_options(p, BUDGET)
+
+
+def perform(a):
+    folder = a.output or Path("out") / a.study.stem
+    analysis.begin("budget", a.study, "study", folder, a.force)
+    run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)
+    e = Members(folder)
+    found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
+    analysis.keep("budget", found, folder, a.force)
+    if found["failed"]:
+        raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
+                       "budget is without the values that they have", "mend what made them fail, or narrow the ranges; "
+                       "`bergtow ensemble --retry-failed` tries them again")

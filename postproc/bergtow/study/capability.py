@@ -1,0 +1,405 @@
+# SPDX-License-Identifier: MIT
+"""Towing capability: the speed that a tow reaches, and the value of a key - concentration, thickness, bollard pull - at
+which half of the tows no longer make it.
+
+    bergtow capability CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
+    bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   the vessel that is enough
+
+A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) along the ordered tow, in
+the mean over the window and over its last quarter, and no branch of its line parts. The last quarter, because a tow
+that has come to rest in the ice has a mean that only tells for how long it has been there: without it the limit is one
+of run.duration. Of the window the time counts in which tow.programme orders that speed: no tow keeps it through a stop
+that is ordered. Rejected: windows in which the body stood still (stalled_windows), since a tow that stops and goes on
+makes it; they are counted beside. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
+line that may part; a prescribed speed is kept whatever it takes. The search is that of study/bracket.py; what it has
+tried is a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where
+periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
+"""
+import argparse
+import ctypes
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bergtow import _library
+from bergtow._program import program_path
+from bergtow.arguments import above_zero, whole_from
+from bergtow.errors import CASE, USAGE, BergtowError, RunError
+from bergtow.result import at_least, compared
+from bergtow.result.run import Run, case_value, parse_case, within
+from bergtow.stats import mean as stat_mean
+from bergtow.study import analysis, bracket, domain_width
+from bergtow.study.case_file import files, section
+from bergtow.study.runs import SPENT, CaseRuns, checked, locked
+
+import numpy as np
+
+BUDGET = 15.0            # min
+FIELDS = 12              # trials of a value, at most
+POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
+PARTS = 16               # the range over the resolution
+STOPPED = 0.1            # of tow.speed: what is slower has stopped
+RANGES = {"ice.concentration": ("0.2", "0.95")}
+LATE = 0.25              # of that time: in which a tow must still keep the speed
+FAILING = 3              # runs that fail at a value before it is given up
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one run says."""
+
+    field: int
+    speed: float      #: m/s, mean over the time of the window in which the speed to be kept is ordered; NaN: adrift
+    late: float       #: that over the last quarter of it
+    stood: bool       #: it stood still for a while, held by the ice
+    parted: bool
+    tow_force: float  #: N, mean; NaN: adrift
+    tension: float    #: N, largest step mean of the run, its start included
+    widths: float = np.nan  #: of the domain in body widths
+    needed: float = np.nan  #: those that the ice asks for, NaN where it asks for none
+
+    def made(self, least):
+        return min(self.speed, self.late) >= least and not self.parted
+
+
+def kept(run, least):
+    """Speeds made good, m/s, over the time of the window in which the tow is ordered to be as fast as that, and over
+    the last quarter of this time; of the whole window where it never is."""
+    time, (start, end) = run["time"], run.window
+    fast = run.ordered_speed >= least * (1 - 1e-9)
+    counts = fast[1:] & fast[:-1]
+    if not np.any(counts & (time[1:] > start) & (time[:-1] < end)):
+        counts[:] = True
+    clock, way = (np.append(0.0, np.cumsum(np.diff(x) * counts)) for x in (time, run.way))
+    first, last = np.interp([start, end], time, clock)
+    since = np.array([first, last - LATE * (last - first)])
+    return (np.interp(last, clock, way) - np.interp(since, clock, way)) / (last - since)
+
+
+def trial(run, number, least):
+    """Of a run that is there. Errors: RunError."""
+    if run.window is None:
+        raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
+    if np.sum(within(run["time"], *run.window)) < 2:
+        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
+                       CASE)
+    if run.at_least:
+        raise RunError(run.path, "the load of the body has no bound in some steps of the window",
+                       "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
+    domain = run.summary.get("domain") or {}
+    widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
+    # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted
+    towed = run.adrift >= run.window[1]
+    speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
+    return Trial(number, speed, late, run.number("stalled_windows") > 0,
+                 any(e["kind"] == "line_broken" for e in run.events), force,
+                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))), widths, needed)
+
+
+@dataclass
+class Condition:
+    """The search under one value of --for."""
+
+    name: str         #: of the folders
+    label: str
+    number: float     #: the value of --for, NaN where there is none
+    sets: dict
+    search: bracket.Bracket
+    trials: dict = field(default_factory=dict)   #: [Trial] by value
+    failed: dict = field(default_factory=dict)   #: [why] by value
+    wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None where that of the case will do
+    why: str = ""     #: the search ended before it was through
+    case: dict = field(default_factory=dict)     #: {key: text} of the case under the value of --for
+
+
+@dataclass
+class Search:
+    """What is searched, and by which runs."""
+
+    runs: CaseRuns
+    key: str
+    unit: str         #: of its values, SI
+    least: float      #: m/s
+    say: object       #: where the progress goes, None for nowhere
+    widen: bool = True
+
+    def folder(self, c, value):
+        return f"{c.name}/{value:.8g}"
+
+    def sets(self, c, value):
+        """What is replaced in the case for a value, {key: value}."""
+        sets = c.sets | {self.key: f"{value:.12g} {self.unit}".strip()}
+        if value not in c.wider:
+            r = self.runs
+            texts = [*r.given, *(f"{k}={v}" for k, v in sets.items())]
+            c.wider[value] = domain_width.needed(r.program, r.case, texts) if self.widen else None
+        return sets | ({"domain.width": c.wider[value]} if c.wider[value] else {})
+
+    def add(self, c, value, n):
+        """n more trials; False where the budget is spent. A run that fails has no outcome: another field is run, and
+        the value is decided where that one could not have changed it."""
+        point = c.search.point(value)
+        value = point.value
+        name, some = self.folder(c, value), c.trials.setdefault(value, [])
+        failed = c.failed.setdefault(value, [])
+        first = len(some) + len(failed)
+        if time.monotonic() + self.runs.seconds.get(name, 0.0) > self.runs.end:
+            return False
+        numbers = range(first, first + n)
+        why = self.runs.make(name, numbers, self.sets(c, value))
+        for i, w in zip(numbers, why):
+            if w == SPENT:
+                return False
+            if at_least.ended(w):  # which tows it ends depends on their loads
+                raise RunError(self.runs.path(name, i), w, "without it the limit would be that of the other tows", CASE)
+            if w:
+                failed.append(w)
+                point.failed += 1
+                continue
+            with Run(self.runs.path(name, i)) as run:
+                some.append(trial(run, i + 1, self.least))
+            good = int(some[-1].made(self.least))
+            point.good, point.bad = point.good + good, point.bad + 1 - good
+        if self.say:
+            print(f"\r{c.label}, {self.key} {value:.4g}: {point.good} of {point.n} make it\x1b[K", end="",
+                  file=self.say, flush=True)
+        if len(failed) >= FAILING:
+            point.spent = True
+            if not some:
+                raise RunError(self.runs.path(name, 0), f"every run failed: {failed[0]}", "mend the case",
+                               self.runs.code_of_failure())
+        return True
+
+    def find(self, c):
+        """Narrow the bracket until it is narrow enough or the budget is spent."""
+        s = c.search
+        while (value := s.next()) is not None:
+            p = s.point(value)
+            sure = next((k for k in range(1, s.most) if bracket.OPEN not in (
+                s.verdict(p.good + k, p.bad, p.failed), s.verdict(p.good, p.bad + k, p.failed))), s.most)
+            if not self.add(c, value, max(1, min(self.runs.jobs, sure, s.most - p.n))):
+                c.why = SPENT
+                return
+
+    def fill(self, c, points, fields):
+        """The curve between the values of the search."""
+        for value in np.linspace(c.search.start, c.search.end, points) if points > 1 else ():
+            value = float(value)
+            while c.search.point(value).n < fields and not c.search.point(value).spent:
+                if not self.add(c, value, min(self.runs.jobs, fields - c.search.point(value).n)):
+                    return
+        # what speaks against the bracket is decided, or stays as it is where the budget does not reach
+        while p := next((p for p in c.search.against() if c.search.more(p.value)), None):
+            if not self.add(c, p.value, min(self.runs.jobs, c.search.most - p.n)):
+                return
+
+
+# ---- what was found
+
+
+def row_of(c, value, least):
+    """Numbers of a value of a condition."""
+    some = c.trials[value]
+    out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
+           "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
+           "stood_still": sum(t.stood for t in some), "late_speed": [t.late for t in some],
+           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value)}
+    for name in ("speed", "tow_force", "tension"):
+        x = np.array([getattr(t, name) for t in some])
+        out[name] = x.tolist()
+        there = x[np.isfinite(x)]
+        out[f"mean_{name}"] = there.mean() if len(there) else np.nan
+        out[f"mean_{name}_95"] = stat_mean.t_interval(there) if len(there) > 1 else (np.nan, np.nan)
+    return out
+
+
+def contradiction(s):
+    """What speaks against the bracket of a search, "" where nothing does."""
+    if not (against := s.against()):
+        return ""
+    p = max(against, key=lambda p: s.judged(p.value) != bracket.OPEN)
+    words = "not monotonic" if s.judged(p.value) != bracket.OPEN else "perhaps not monotonic"
+    return f"{words}: at {p.value:.4g} {p.good} of {p.n} make it"
+
+
+def failures(s):
+    """Of a value at the limit that only the runs that failed leave undecided, "" where there is none."""
+    return next((f"at {p.value:.4g} {p.failed} of {p.n + p.failed} runs failed, which leaves it undecided"
+                 for p in s.points.values() if p.failed and s.judged(p.value) == s.expected(p.value) == bracket.OPEN
+                 and not s.more(p.value) and s.decidable(p, 0)), "")
+
+
+def found_of(c, least):
+    """The limit of a condition, and its curve."""
+    s = c.search
+    yes, no = s.ends()
+    why, sure = c.why or contradiction(s), False
+    if not why and yes is not None and no is not None and abs(no - yes) > s.resolution * (1 + 1e-6):
+        why = failures(s) or f"between them near {100 * s.share:g} % make it, and {s.most} fields do not decide"
+    elif not why and (yes is None or no is None):
+        sure = all(s.judged(v) != bracket.OPEN for v in (s.start, s.end))
+        why = (failures(s) or f"{s.most} fields do not decide an end of the range" if not sure else
+               "every value of the range makes it" if no is None else "no value of the range makes it")
+    return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no,
+            "estimate": np.nan if s.against() else s.estimate(), "resolved": sure or not why, "why": why,
+            "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
+            "points": [row_of(c, v, least) for v in sorted(c.trials) if c.trials[v]]}
+
+
+# ---- command line
+
+
+def resolved(binary, case, sets):
+    """{key: text} of the case with keys replaced, as the program reads it. Errors: RunError in the program's words."""
+    return parse_case(checked(binary, case, sets, "--scale", "1"))
+
+
+def with_number(binary, case, sets, key, text):
+    """(the case with a value of a key, that value in SI units)."""
+    found = resolved(binary, case, [*sets, f"{key}={text}"])
+    value = case_value(found, key)
+    if not np.isfinite(value):
+        raise RunError(case, f"{key}={text} is no number", "search a key that is a number", USAGE)
+    return found, value
+
+
+def conditions(a, binary, given, start, end, resolution):
+    """Those of --for, or the case alone."""
+    def search():
+        return bracket.Bracket(start, end, resolution, a.share, a.fields)
+    if not a.conditions:
+        return [Condition("case", "the case", np.nan, {}, search())]
+    key, _, texts = a.conditions.partition("=")
+    texts = [t.strip() for t in texts.split(",") if t.strip()]
+    if not texts:
+        raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"', USAGE)
+    out = []
+    for k, text in enumerate(texts):
+        case = resolved(binary, a.case, [*given, f"{key}={text}"])
+        out.append(Condition(f"c{k + 1}", f"{key} {text}", case_value(case, key), {key: text}, search(), case=case))
+    return out
+
+
+def check(case, key):
+    """A case in which a tow may stop. Errors: RunError."""
+    mode, load = case.get("tow.mode"), case_value(case, "tow.line.breaking_load", 0.0)
+    if mode != "thrust" and not (mode == "line" and load > 0):
+        raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
+                       "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
+                       "tow.line.breaking_load", CASE)
+    if domain_width.read_ice_of(case):
+        raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
+                       "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
+                       "each value", CASE)
+    if key == "ice.seed":
+        raise RunError(key, "the fields are its values already", "search another key", USAGE)
+
+
+def share(text):
+    value = above_zero(text)
+    if not 0.05 <= value <= 0.95:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0.05 to 0.95")
+    return value
+
+
+def options(p):
+    p.add_argument("case", metavar="CASE.yml", type=Path)
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/capability-CASE; runs are kept "
+                   "there, and the same call takes those of the same case file and program")
+    p.add_argument("--search", default="ice.concentration", metavar="KEY", help="key along which the limit is searched "
+                   "(default ice.concentration)")
+    p.add_argument("--from", dest="start", metavar="V", help="one end of its range (ice.concentration: 0.2)")
+    p.add_argument("--to", dest="end", metavar="V", help="the other end (ice.concentration: 0.95)")
+    p.add_argument("--resolution", metavar="V", help="width of the bracket at which the search ends (default: "
+                   f"1/{PARTS} of the range)")
+    p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
+    p.add_argument("--speed", metavar="V", help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
+    p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
+                   "(default 0.5)")
+    p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
+                   help=f"fields of a value, at most (default {FIELDS})")
+    p.add_argument("--points", type=whole_from(0, 100), default=POINTS, metavar="N",
+                   help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
+                   "search alone)")
+    domain_width.add_option(p)
+    analysis.add_options(p, BUDGET)
+
+
+def number(option, text, unit):
+    """A number of an option with a unit, read as the program reads it. Errors: RunError."""
+    value = ctypes.c_double()
+    try:
+        _library.library().bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+    except BergtowError as error:
+        raise BergtowError(f"{option} {error}", USAGE) from None
+    return value.value
+
+
+def check_options(a):
+    for name, k in (("start", 0), ("end", 1)):
+        if getattr(a, name) is None:
+            if a.search not in RANGES:
+                raise BergtowError(f"--search {a.search}: say its range with --from and --to", USAGE)
+            setattr(a, name, RANGES[a.search][k])
+    said = [text.partition("=")[0].strip() for text in (*a.set, a.conditions or "", a.search) if text]
+    for key in said:
+        if said.count(key) > 1:
+            raise BergtowError(f"{key} is given by more than one of --search, --for and --set: leave it in one", USAGE)
+
+
+def perform(a):
+    check_options(a)
+    folder = a.output or Path("out") / f"capability-{a.case.stem}"
+    analysis.begin("capability", a.case, "case", folder, a.force)
+    began, binary = time.monotonic(), program_path()
+    case = resolved(binary, a.case, a.set)
+    check(case, a.search)
+    ends = [with_number(binary, a.case, a.set, a.search, text) for text in (a.start, a.end)]
+    start, end = (value for _, value in ends)
+    if start == end:
+        raise RunError(a.search, "the range has no extent", "give --from and --to two values", USAGE)
+    unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
+    resolution = abs(end - start) / PARTS
+    if a.resolution:
+        resolution = number("--resolution", a.resolution, unit)
+        if not 0 < resolution <= abs(end - start):
+            raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
+                           f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
+    if a.speed:
+        least = number("--speed", a.speed, "m/s")
+        if not least > 0:
+            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep", USAGE)
+    last = began + 60 * a.budget
+    runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
+    replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
+    layers = files(a.case)
+    keep = a.keep_width or domain_width.stays({name: section(layers, name) for name in ("domain", "ice")}, replaced)
+    search = Search(runs, a.search, unit, least, sys.stderr if sys.stderr.isatty() else None, not keep)
+    some = conditions(a, binary, a.set, start, end, resolution)
+    with locked(folder / "capability") as runs.lock:
+        for k, c in enumerate(some):
+            runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
+            search.find(c)
+        runs.end = last
+        for c in some:
+            search.fill(c, a.points, CURVE)
+    if search.say:
+        print(file=search.say)
+    grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
+    across = (a.conditions or "").partition("=")[0].strip()
+    load = case_value(case, "tow.line.breaking_load", 0.0)
+    # keys whose default follows from what is varied are varied with it
+    alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
+    title = case.get("run.title", "none")
+    found = {
+        "case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
+        "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
+        "range": [start, end], "resolution": resolution, "for": across,
+        "for_unit": case.get(across, "").partition(" ")[2],
+        "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
+        "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
+        "conditions": [found_of(c, least) for c in some]
+    }
+    analysis.keep("capability", found, folder, a.force)
+    runs.tell_failed()

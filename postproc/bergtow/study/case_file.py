@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The files of a case as YAML: its own and those that it is based on. What they mean is for the program to say."""
+import os
+
+import yaml
+
+from bergtow import _library
+from bergtow.errors import CASE, RunError
+
+
+def contents(path):
+    """The file as YAML. Errors: RunError."""
+    try:
+        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file",
+                       4 if isinstance(error, OSError) else CASE) from None
+    if not isinstance(found, dict):
+        raise RunError(path, "is neither a case nor a study", "name a case or a study file", CASE)
+    return found
+
+
+def files(path):
+    """[(path, contents)] of a case and of what it is based on, its own file first. Errors: RunError."""
+    found = [(path, contents(path))]
+    while isinstance(found[-1][1].get("base"), str):
+        path = path.parent / found[-1][1]["base"]
+        if path.resolve() in [p.resolve() for p, _ in found]:
+            raise RunError(path, "is based on itself", "remove one of the keys `base`")
+        found.append((path, contents(path)))
+    return found
+
+
+def is_study(path):
+    """Is this the file of a study, and not of a case?"""
+    return _library.library().bt_file_holds(os.fsencode(path)) == b"study"
+
+
+def section(layers, name):
+    """The keys of a section of a case, of all its files."""
+    out = {}
+    for _, found in reversed(layers):
+        keys = found.get(name)
+        out |= keys if isinstance(keys, dict) else {}
+    return out
+
+
+def says(case, section, key):
+    """What a case, {section: its keys}, says of a key; None where it says nothing."""
+    return case.get(section, {}).get(key)

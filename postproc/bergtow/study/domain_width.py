@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""The width that a domain of periodic sides needs for its ice, by the rule of `bergtow check`: a load that rests on the
+periodic images of the body is none to design for. Walls are part of the question, and stay where they are; so does the
+length of a domain in which the tow goes along y, which has a warning."""
+import json
+import math
+
+from bergtow.study.case_file import says
+from bergtow.study.runs import checked
+
+#: where a case says one of these, the place of its ice is given, and the domain is not made wider
+PLACED = "domain.y0", "ice.y_min", "ice.y_max", "ice.extent.y_min", "ice.extent.y_max"
+
+
+def add_option(parser):
+    parser.add_argument("--keep-width", action="store_true", help="leave domain.width as the case has it, although "
+                        "dense ice needs a wider domain")
+
+
+def reads_ice(case):
+    """Is the ice of a case read, so that it has no concentration to vary?"""
+    return any(str(says(case, "ice", k) or "none") != "none" for k in ("outlines", "field"))
+
+
+def read_ice_of(values):
+    """The same of a resolved case, {"section.key": text}."""
+    return any(values.get(f"ice.{k}", "none") != "none" for k in ("outlines", "field"))
+
+
+def stays(case, replaced):
+    """Is the width of this case left as it is? replaced: keys that are given otherwise."""
+    return (reads_ice(case) or any(says(case, *key.split(".")[:2]) is not None for key in PLACED)
+            or bool({"domain.width", *PLACED} & set(replaced)))
+
+
+def wide_enough(domain):
+    """The width, m, of three digits, that the ice in a domain needs; None where it is there, or cannot be had."""
+    there, needed = domain["body_widths"], domain["body_widths_needed"]
+    if domain["across"] != "domain.width" or domain["sides"] != "periodic images":
+        return None
+    if not there or not needed or needed <= there:
+        return None
+    width = domain["width_m"] * needed / there
+    digit = 10.0 ** (math.floor(math.log10(width)) - 2)
+    return round(math.ceil(width / digit) * digit, 6)
+
+
+def needed(binary, path, sets):
+    """domain.width, as text, that the case of this path needs with these keys replaced ("key=value"); None where it
+    has it. Errors: RunError."""
+    width = wide_enough(json.loads(checked(binary, path, sets, "--json"))["domain"])
+    return None if width is None else f"{width:g} m"

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""Tables of text or Markdown, and how numbers stand in them."""
+import numpy as np
+
+from bergtow.result.at_least import AtLeast
+
+FAR = 10.0  # times a level: an end beyond bounds nothing
+
+
+def hours_text(hours):
+    return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
+
+
+PROSE = 40  # characters: a column with a longer cell holds words, not numbers
+
+
+def table(head, rows, markdown):
+    """Columns of a head and rows of texts: the first and those that hold words are left-aligned, the others right."""
+    width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
+    left = [k == 0 or max((len(row[k]) for row in rows), default=0) > PROSE for k in range(len(head))]
+    if markdown:
+        return "\n".join("| " + " | ".join(cells) + " |"
+                         for cells in (head, ["---" if words else "---:" for words in left], *rows))
+    def line(cells):
+        return "  ".join(c.ljust(w) if words else c.rjust(w) for c, w, words in zip(cells, width, left)).rstrip()
+    return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
+
+
+def scale(values, unit):
+    """(factor, unit): values / factor read well in the unit, with its k, M or G where they are large."""
+    values = np.asarray(values, dtype=float)
+    values = np.abs(values[np.isfinite(values)])
+    top = values.max(initial=0.0)
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if top >= 2 * factor:
+            return factor, prefix + unit
+    return 1.0, unit
+
+
+def short(value, digits=3):
+    """A number to so many significant digits, without exponent where that can be avoided."""
+    if value == 0 or not np.isfinite(value):
+        return f"{value:g}"
+    if isinstance(value, AtLeast):
+        return f"at least {short(float(value), digits)}"
+    value = float(f"{value:.{digits - 1}e}")  # 99.96 has as many digits as 100
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"
+
+
+def quantity(value, unit):
+    """A number with unit, in thousands where it is large: 12345, "N" gives 12.3 kN."""
+    factor, name = scale([value], unit)
+    return f"{short(value / factor)} {name}"
+
+
+def number(value, digits=3):
+    """A number to so many digits, "–" where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+
+
+def _first(value):
+    """Decimal place of the first digit."""
+    return int(np.floor(np.log10(abs(value))))
+
+
+def designed(value, least=-np.inf):
+    """A load that is designed for, to three digits, which is within 0.5 %: with two, 1049 would be 1000. Rounded up
+    where the nearest lies below `least`, the largest simulated, and the value itself does not."""
+    if value == 0 or not np.isfinite(value):
+        return value
+    place = _first(value) - 2
+    nearest = round(value, -place)
+    return nearest if nearest >= least or value < least else round(nearest + 10.0 ** place, -place)
+
+
+def last_place(value, low, high):
+    """Decimal place of the last digit that the ends of an interval are worth: of the two digits that its wider side
+    leaves, and two to three of the value's own; three where an end would be rounded to the other side of the value.
+    None where no side has a width."""
+    wide = max((abs(end - value) for end in (low, high) if np.isfinite(end)), default=0.0)
+    if not wide > 0:
+        return None
+    first = _first(value if value else wide)
+    place, there = min(max(_first(wide) - 1, first - 2), first - 1), designed(value)
+    below, above = (round(end, -place) if np.isfinite(end) else there for end in (low, high))
+    return place if below <= there <= above else first - 2
+
+
+def to_place(value, place):
+    """A number to this decimal place, "no bound" where it is not finite."""
+    return f"{round(value, -place) + 0.0:.{max(0, -place)}f}" if np.isfinite(value) else "no bound"
+
+
+def bound(value, high):
+    """The upper end of the interval of a level: one FAR times the level away bounds nothing, but says that the sample
+    does not know the tail, and is infinite."""
+    return np.inf if np.isfinite([value, high]).all() and value > 0 and high > FAR * value else high
+
+
+def level(value, ends, factor=1.0):
+    """A level, to three digits, and its interval, to those that it is worth."""
+    low, high = ends[0], bound(value, ends[1])
+    place = last_place(value / factor, low / factor, high / factor)
+    if place is None or np.isnan([low, high]).any():
+        return number(value / factor), pair((low, high), factor)
+    return number(value / factor), " to ".join(to_place(v / factor, place) for v in (low, high))
+
+
+def pair(values, factor=1.0):
+    low, high = values
+    if np.isnan([low, high]).any():
+        return "–"
+    return " to ".join("no bound" if np.isinf(v) else number(v / factor) for v in (low, high))

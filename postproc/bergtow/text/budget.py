@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""The uncertainty budget of bergtow budget as one table and one picture."""
+from bergtow.result.members import listed
+from bergtow.table import number, quantity, scale, table
+from bergtow.text.converge import percent
+
+import numpy as np
+
+TRUSTED_Q2 = 0.7  # below, shares are a rough guide
+
+
+def _force(found, x):
+    return "–" if x is None or not np.isfinite(x) else quantity(x, found["units"])
+
+
+def _ends(found, ends):
+    if ends is None or None in ends:
+        return ""
+    return f" ({_force(found, ends[0])} to {_force(found, ends[1])})"
+
+
+def _percent(x):
+    return "–" if x is None or not np.isfinite(x) else f"{100 * x:.0f} %"
+
+
+def _index(i, what):
+    low, high = i[f"{what}_95"]
+    ends = "" if low is None else f" ({number(low, 2)} to {number(high, 2)})"
+    return number(i[what], 2) + ends
+
+
+def rows(found):
+    """The lines of the table."""
+    mean, b = found["mean"], found
+    out = [["mean", _force(found, mean) + _ends(found, b["mean_95"]), "", "", "", "", ""]]
+    one = b["fields"]["sd"] is None
+    parts = [("fields: one tow", b["fields"]), ("parameters" + (" and fields" if one else ""), b["parameters"])]
+    for name, p in parts[one:]:
+        out.append([name, _force(found, p["sd"]) + _ends(found, p["sd_95"]), _percent(p["sd"] / abs(mean)),
+                    _percent(p["share"]), "", "", ""])
+    indices = b["shares"].get("indices", {})
+    for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
+        i, given = indices.get(name), found["assumed"][name]
+        source = given["source"] or "assumed"
+        out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
+                    "; ".join(t for t in (given["distribution"], source) if t)])
+    out += _numerics(found)
+    out.append(["together", _force(found, b["together"]["sd"]), _percent(b["together"]["sd"] / abs(mean)), "", "", "",
+                ""])
+    return out
+
+
+def _numerics(found):
+    """The line of the scatter that the computation may add, and that of what it is known to add."""
+    n, mean = found["numerics"], abs(found["mean"])
+    if not n or "refused" in n:
+        return [["numerics", "not known" if n else "not studied", *[""] * 5]]
+    bound = "" if n["unknown"] else "at most "
+    known = n["sd"] is not None and np.isfinite(n["sd"])
+    out = [["numerics", bound + _force(found, n["sd"]) if known else "not known",
+            _percent(n["sd"] / mean) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
+    if n.get("biases"):
+        out.append([f"bias of {', '.join(n['biases'])}", _force(found, abs(n["bias"])),
+                    _percent(abs(n["bias"]) / mean), _percent(n["bias_share"]), "", "", ""])
+    return out
+
+
+def numerics_notes(found):
+    """Sentences on what is known of the computation, and what is not."""
+    n = found["numerics"]
+    if not n:
+        return " Numerics: run `bergtow converge` on the base case and name its file with --converge." \
+            if found["of"] == "mean_ice_resistance_n" else \
+            " Numerics: `bergtow converge` knows what the computation adds to the mean ice resistance alone."
+    if "refused" in n:
+        return f" Numerics: {n['refused']}."
+    said = ""
+    if n.get("biases"):
+        each = ", ".join(f"{name} by {percent(b)}" for name, b in n["biases"].items())
+        said = (f" Bias: the values to which it was converged change the mean, {each}; together "
+                f"{percent(n['bias'] / found['mean'])}. It is no scatter: no number here is corrected for it, and "
+                "its square is in the last line and the shares.")
+    if n.get("unknown"):
+        said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."
+    return said
+
+
+def notes(found):
+    s = found["shares"]
+    if "refused" in s:
+        shares = f"The parameters' part is not shared out: {s['refused']}."
+    else:
+        trust = "" if s["q2"] >= TRUSTED_Q2 else (
+            " That is little: take the shares as a rough guide, and more conditions for better ones.")
+        shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
+                f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
+    return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
+            f"{found['members']} tows. {shares}{numerics_notes(found)}")
+
+
+def warnings(found):
+    """Lines on what is not in the numbers."""
+    wanted, out = found["wanted"], []
+    left = found.get("waiting", wanted - found["members"])
+    if left:
+        beyond = found.get("left_out")
+        out.append(f"{left} of {wanted} members are still to come: this is of the first {found['conditions']} "
+                   "conditions, which are a fair sample, and its intervals are wider than those of the whole study."
+                   + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they "
+                      "are depends on how long a tow takes." if beyond else ""))
+    if failed := found.get("failed"):
+        name, why = next(iter(failed.items()))
+        within = set(failed) - set(found.get("failed_beyond", []))
+        out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). " + (
+            "What made them fail may be what the budget asks for: there are no intervals." if within else
+            "They lie beyond the first gap, and are not in this sample."))
+    if lacking := found.get("without_number"):
+        out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "
+                   "intervals.")
+    if doubtful := found.get("doubtful"):
+        kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(found["doubts"].items()))
+        out.append(f"{doubtful} of {found['members']} tows carry warnings and are in the numbers ({kinds}; "
+                   "`bergtow statistics` says what each means).")
+    if copies := found.get("copies"):
+        out.append(f"{len(copies)} of {wanted} members are the same run as another one of their condition, and count "
+                   "with it once.")
+    if builds := found.get("builds"):
+        out.append(builds)
+    return [f"WARNING: {line}" for line in out]
+
+
+def text(found, markdown=False):
+    """The table of each number, one below the other."""
+    return "\n\n".join(_text(one, markdown) for one in (found, *found.get("more", [])))
+
+
+def _text(found, markdown):
+    head = ["part", "standard deviation", "of the mean", "share of the variance", "Sobol, first order", "total",
+            "range and source"]
+    return "\n\n".join([*warnings(found), table(head, rows(found), markdown), notes(found)])
+
+
+def figure(found):
+    """Standard deviations of the parts, and the indices of the parameters."""
+    from bergtow.plot import style
+
+    indices = found["shares"].get("indices", {})
+    names = sorted(indices, key=lambda k: indices[k]["total"] or 0.0)
+    fig, (left, right) = style.subplots(1, 2, figsize=(10.4, 2.3 + 0.36 * max(4, len(names))))
+    width, height = fig.get_size_inches()
+    fig.subplots_adjust(left=1.2 / width, right=1 - 0.25 / width, top=1 - 0.95 / height, bottom=0.7 / height,
+                        wspace=0.55)
+    some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k].get("sd") is not None]
+    if (n := found["numerics"]) and n.get("biases"):
+        some.append(("bias", {"sd": abs(n["bias"])}))
+    factor, unit = scale([found["together"]["sd"]], found["units"])
+    for y, (name, p) in enumerate([*reversed(some), ("together", found["together"])]):
+        left.barh(y, p["sd"] / factor, height=0.6, color=style.FAINT if name == "together" else style.ICE)
+        ends = p.get("sd_95")
+        if ends and None not in ends:
+            left.plot(np.array(ends) / factor, [y, y], color=style.INK, linewidth=1.2)
+    left.set_yticks(range(len(some) + 1), [*(k for k, _ in reversed(some)), "together"])
+    left.set_xlabel(f"standard deviation, {unit}")
+    for y, name in enumerate(names):
+        for what, colour, at in (("total", style.TOW, y - 0.18), ("first", style.DRAG, y + 0.18)):
+            i = indices[name]
+            right.barh(at, i[what] or 0.0, height=0.32, color=colour, label={"total": "total", "first": "alone"}[what]
+                       if y == 0 else None)
+            if None not in i[f"{what}_95"]:
+                right.plot(i[f"{what}_95"], [at, at], color=style.INK, linewidth=1.2)
+    right.set_yticks(range(len(names)), names)
+    right.set_xlabel("share of the parameters' part (Sobol index)")
+    if names:
+        right.legend(loc="lower right")
+    else:
+        right.text(0.5, 0.5, "not shared out", transform=right.transAxes, ha="center", color=style.FAINT)
+    for axes in (left, right):
+        axes.set_xlim(left=0)
+        axes.grid(True, axis="x")
+    style.head(fig, f"{style.plain(found['title'])}: uncertainty budget",
+               f"{found['meaning']}: {_force(found, found['mean'])} on average; black: 95 %", left=0.15 / width)
+    return fig

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+"""What bergtow capability found, as tables and as a picture."""
+from bergtow.result.members import reading
+from bergtow.table import number, quantity, scale, short, table
+
+import numpy as np
+
+FAR_LOAD = 2  # times the largest tension: a breaking load beyond is not in the picture
+
+
+def value(found, x):
+    """A value of the searched key with its unit, a concentration in %, an angle in degrees."""
+    if x is None:
+        return "–"
+    factor, unit = reading(found["search"], found["unit"])
+    return quantity(x, "N") if unit == "N" else f"{short(factor * x)} {unit}".strip()
+
+
+def force(x):
+    return "–" if x is None or not np.isfinite(x) else quantity(x, "N")
+
+
+def condition(found, c):
+    """Words for a condition below a head that names its key."""
+    return c["label"].removeprefix(f"{found['for']} ")
+
+
+def limits(found, markdown=False):
+    head = [found["for"] or "case", "makes it at", "does not at", "limit about", "runs", "verdict"]
+    rows = []
+    for c in found["conditions"]:
+        verdict = ": ".join(w for w in ("resolved" if c["resolved"] else "not resolved", c["why"]) if w)
+        ends = [value(found, c[k]) for k in ("makes_it", "does_not", "estimate")]
+        rows.append([condition(found, c), *ends, str(c["runs"]), verdict])
+    return table(head, rows, markdown)
+
+
+def least_of(values):
+    """What bounds an interval of their mean: 0, unless some are below, as speeds are where a body was driven back."""
+    return min((x for x in values if x is not None and x < 0), default=0.0)
+
+
+def curve(found, markdown=False):
+    head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted",
+            "speed, m/s (95 %)", "mean tow force", "largest tension: mean", "of all"]
+    rows = []
+    for c in found["conditions"]:
+        for p in c["points"]:
+            low, high = p["mean_speed_95"]
+            band = "" if low is None else f" ({number(max(low, least_of(p['speed'])))} to {number(high)})"
+            tension = [x for x in p["tension"] if x is not None]
+            made = f"{p['made']} of {p['fields']}"
+            rows.append([condition(found, c), value(found, p["value"]), made, str(p.get("stood_still", "–")),
+                         str(p["failed"]), str(p["parted"]),
+                         number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
+                         force(max(tension, default=None))])
+    return table(head, rows, markdown)
+
+
+def meaning(found):
+    """What the words of the tables mean, and what it took."""
+    runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
+        p["failed"] for c in found["conditions"] for p in c["points"])
+    line = ", and no branch of its line parts" if found["breaking_load"] else ""
+    more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that "
+            "failed could have changed it.") if failed else ""
+    if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
+        more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
+                 "tension, the largest of a step, the start included, is among the others.")
+    return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
+            f"over the window, as far as it is ordered to be so fast there, and over the last quarter of that "
+            f"time{line}. Stood still: tows that the ice held for a while. "
+            f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "
+            f"fewer, each at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
+            f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
+            f"{found['grid_runs']}.{more}")
+
+
+def narrow(found):
+    """Where the domain is too narrow for its ice, a sentence; "" where it is not, or where nothing tells."""
+    few = [(p["value"], p["body_widths"], p["body_widths_needed"]) for c in found["conditions"] for p in c["points"]
+           if (p.get("body_widths_needed") or 0) > (p.get("body_widths") or np.inf)]
+    if not few:
+        return ""
+    values = sorted({v for v, _, _ in few})
+    at = value(found, values[0]) + (f" to {value(found, values[-1])}" if len(values) > 1 else "")
+    return (f"WARNING: at {at} the domain is narrow for its ice ({min(w for _, w, _ in few):.3g} body widths; up to "
+            f"{max(n for _, _, n in few):.3g} are asked for): walls or periodic images carry part of the resistance, "
+            "and tows stop too early there; make domain.width larger.")
+
+
+def wider(found):
+    """Where the domain was made wider for its ice, a sentence; "" where it was not."""
+    made = [(p["value"], p["wider"]) for c in found["conditions"] for p in c["points"] if p.get("wider")]
+    if not made:
+        return ""
+    values, widths = (sorted({x[k] for x in made}, key=lambda v: float(str(v).split()[0])) for k in (0, 1))
+    at, to = ([f(x[0])] + [f(x[-1])] * (len(x) > 1) for x, f in ((values, lambda v: value(found, v)), (widths, str)))
+    return (f"At {' to '.join(at)} the domain was made {' to '.join(to)} wide: narrower, its periodic images would "
+            "carry part of the resistance (--keep-width leaves it).")
+
+
+def text(found, markdown=False):
+    return "\n\n".join(part for part in (limits(found, markdown), narrow(found), wider(found), meaning(found),
+                                         curve(found, markdown)) if part)
+
+
+def _numbers(values):
+    return np.array([np.nan if v is None else v for v in values], dtype=float)
+
+
+def _curve(axes, c, name, colour, factor, unit):
+    x = _numbers([p["value"] for p in c["points"]]) * factor
+    mean = _numbers([p[f"mean_{name}"] for p in c["points"]])
+    low, high = np.array([_numbers(p[f"mean_{name}_95"]) for p in c["points"]]).reshape(-1, 2).T
+    for at, p in zip(x, c["points"]):
+        y, adrift = _numbers(p[name]) / unit, np.isnan(_numbers(p["speed"]))
+        for some, mark in ((~adrift, "."), (adrift, "x")):
+            axes.plot(np.full(np.sum(some), at), y[some], mark, color=colour, alpha=0.35, markersize=5)
+    axes.plot(x, mean / unit, color=colour, label=c["label"])
+    least = np.array([least_of(p[name]) for p in c["points"]])
+    axes.fill_between(x, np.maximum(low, least) / unit, high / unit, color=colour, alpha=0.15, linewidth=0)
+
+
+def figure(found):
+    """Speed and largest tension over the searched key, and the limit over the values of --for where they are
+    numbers."""
+    from bergtow.plot import style
+
+    colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT
+    some, (factor, read_in) = found["conditions"], reading(found["search"], found["unit"])
+    across = all(c["for"] is not None for c in some) and sum(
+        c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some) > 1
+    fig, grid = style.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
+    width, height = fig.get_size_inches()
+    fig.subplots_adjust(left=0.75 / width, right=1 - 0.2 / width, top=1 - 1.0 / height, bottom=0.95 / height,
+                        wspace=0.3)
+    of = "concentration" if found["search"] == "ice.concentration" else found["search"]
+    words = f"{of}, {read_in}".rstrip(", ")
+    largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
+    kilo, newton = scale(largest, "N")
+    parted = any(None in p["speed"] for c in some for p in c["points"])
+    parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
+    between = [c for c in some if c["makes_it"] is not None and c["does_not"] is not None]
+    for axes, name, label, unit, line in (
+            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"]),
+            (grid[0, 1], "tension", f"largest line tension, {newton}", kilo, found["breaking_load"] if parts else 0.0)):
+        for c, colour in zip(some, colours * len(some)):
+            if c["points"]:
+                _curve(axes, c, name, colour, factor, unit)
+            if c in between:
+                axes.axvspan(factor * c["makes_it"], factor * c["does_not"], color=colour, alpha=0.10, linewidth=0)
+        axes.set_xlabel(words)
+        axes.set_ylabel(label)
+        shown = [0.0, line, *(x for c in some for p in c["points"] for x in p[name] if x is not None)]
+        bands = _numbers([p[f"mean_{name}_95"][1] for c in some for p in c["points"]])
+        top = max(max(shown), min(2 * max(shown), max(bands[np.isfinite(bands)], default=0.0)))
+        axes.set_ylim(min(shown) / unit, 1.06 * top / unit or 1.0)
+        axes.grid(True)
+    grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                       label=f"to be kept: {number(found['speed'])} m/s")
+    if parts:
+        grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                           label="breaking load")
+        grid[0, 1].legend()
+    grid[0, 0].legend()
+    if across:
+        axes, x = grid[0, 2], [c["for"] for c in some]
+        for at, c in zip(x, some):
+            ends = [v for v in (c["makes_it"], c["does_not"]) if v is not None]
+            if len(ends) == 2:
+                axes.plot([at, at], [factor * v for v in ends], color=style.INK, linewidth=2)
+        axes.plot(x, factor * _numbers([c["estimate"] for c in some]), "o-", color=style.ICE, markersize=5)
+        axes.set_xlabel(f"{found['for']}, {found['for_unit']}".rstrip(", "))
+        axes.set_ylabel(f"limit, {words}")
+        axes.set_ylim(*sorted(factor * v for v in found["range"]))
+        axes.grid(True)
+    style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
+               "dots: fields" + ", crosses: those whose line parted" * parted +
+               "; band: 95 % of their mean" + "; shaded: where the limit lies" * bool(between), left=0.15 / width)
+    return fig

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The verdicts of bergtow converge, a line each, or as a table of the report."""
+from bergtow.table import number, table
+
+WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
+
+
+def percent(value):
+    """To a tenth below 20 %, where the margin lies, and to two digits beyond."""
+    if value is None:
+        return "–"
+    x = 100 * value
+    return f"{x:+.1f} %" if abs(x) < 20 else f"{float(f'{x:.1e}'):+.0f} %"
+
+
+def interval(ends):
+    return "–" if ends is None or None in ends else f"{percent(ends[0])} to {percent(ends[1])}"
+
+
+def value(row, which):
+    at = row.get(which)
+    return "–" if at is None else f"{at:.4g} {row.get('unit') or ''}".strip()
+
+
+def advice(row):
+    """What to take."""
+    at = value(row, "recommended")
+    if row["name"] == "fields":
+        return f"{value(row, 'recommended')} fields for {100 * row['wanted_error']:g} %"
+    if row["judged"] == "none":
+        return f"{at} will do"
+    if row["judged"] == "matters" and row.get("recommended") is None:
+        return row["why"]
+    if row["judged"] == "matters" and row.get("walls"):
+        return f"the walls are felt; without them, take {at} or {row['finer']}"
+    if row["judged"] == "matters":
+        return f"take {at}, or {row['finer']}"
+    return row.get("why") or "–"
+
+
+def cells(row):
+    if "mean" in row:
+        return ["fields", "–", f"mean {number(row['mean'])} N", "–", f"{row['fields']}", WORDS[row["judged"]],
+                advice(row)]
+    if "from" not in row:
+        return [row["name"], "–", "–", "–", "–", WORDS[row["judged"]], row.get("why", "–")]
+    on = f"{row['fields']}, {'the same ice' if row['same_ice'] else 'other ice'}"
+    if row.get("pairing") is not None:
+        on += f", error x {row['pairing']:.2g}"
+    # the same twice: a start whose ramp can be no longer, looked at as it is
+    values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
+    return [row["name"], values, row["quantity"],
+            f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
+
+
+def doubtful(found):
+    """A line on windows of the case that are not those of a steady tow; "" without one."""
+    verdicts = found.get("verdicts") or {}
+    some = [f"{verdicts[kind]} {kind}" for kind in ("not steady", "too short") if verdicts.get(kind)]
+    if not some:
+        return ""
+    return (f"WARNING: of the {sum(verdicts.values())} tows of the case as it is, {' and '.join(some)}: an effect on "
+            "their mean is one on the mean of that stretch of time.\n\n")
+
+
+def text(found, markdown=False):
+    head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
+            "it is of the error that other ice for each value would leave. What is below "
+            f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
+    return doubtful(found) + table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note

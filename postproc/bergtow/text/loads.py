@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: MIT
+"""The design statement and the statistics of loads as tables of text or Markdown."""
+from itertools import zip_longest
+
+import numpy as np
+
+from bergtow import table as text_table
+from bergtow.result.members import worded
+from bergtow.stats import load as stat_load
+from bergtow.table import hours_text, number, pair, quantity, scale, table
+
+NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
+SHOWN = 5, 50, 95, 99  # quantiles in a table, %
+MOST_NAMED = 5  # conditions of a warning
+
+
+def _towed(s):
+    return [c for c in s["conditions"] if c["design"]["tow"]]
+
+
+def asked(s):
+    """"Design tow force: exceeded with a probability of 5 % in a tow of 24 h, as the moving mean over 30 s"; the range
+    where conditions differ. "" where nothing is towed."""
+    some = [c["design"]["tow"] for c in _towed(s)]
+    if not some:
+        return ""
+    def span(key, text):
+        low, high = min(d[key] for d in some), max(d[key] for d in some)
+        return text(low) if high - low < 1e-6 * high else f"{text(low)} to {text(high)}"
+    return (f"Design tow force: exceeded with a probability of {100 * some[0]['probability']:g} % in a tow of "
+            f"{span('tow_hours', hours_text)}, as the moving mean over {span('time_scale_s', lambda v: f'{v:.3g} s')}")
+
+
+def value(d, factor):
+    if "refused" in d:
+        return "–"
+    return number(text_table.designed(d["value"], d["largest"]) / factor) + ("*" if d["beyond_data"] else "")
+
+
+def ends(d, factor):
+    if "refused" in d:
+        return "–"
+    low, high = d["interval_95"]
+    return pair((low, text_table.bound(d["value"], high)), factor)
+
+
+def design(s, markdown):
+    """The design statement: a row a condition, what it holds for, and the warnings."""
+    some = _towed(s)
+    if not some:
+        return "No design tow force. " + "\n".join(warnings(s))
+    found = [c["design"]["tow"] for c in some]
+    factor, unit = scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
+    lines = any(c["design"]["tension"] for c in some)
+    head = ["condition", f"design tow force, {unit}", "95 %", *([f"line tension, {unit}", "95 %"] if lines else []),
+            f"mean, {unit}", f"largest simulated, {unit}", "hours simulated", "return time, h", "fields", "tail"]
+    rows = []
+    for c in s["conditions"]:
+        d, t = c["design"]["tow"], c["design"]["tension"]
+        if d is None:
+            rows.append([c["label"], *["–"] * (len(head) - 1)])
+            continue
+        tension = ([value(t, factor), ends(t, factor)] if t else ["–", "–"]) if lines else []
+        rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
+                     number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
+                     d.get("model", "–")])
+    notes = [
+        f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
+        f"warnings name. * beyond the hours simulated: extrapolated by the tail."
+    ]
+    notes += [text for text in (steps(s), holds_for(s)) if text]
+    return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+
+
+def steps(s):
+    """What the tensions of single steps reach, which are in no design tension; "" without a line."""
+    found = {}
+    for c in sorted(s["conditions"], key=_governs):
+        for x in c["design"]["branches"]:
+            load = f", breaking load {quantity(x['breaking_load'], 'N')}" if np.isfinite(x["breaking_load"]) else ""
+            found.setdefault(x["label"], []).append(f"{c['label']} {quantity(x['largest_step'], 'N')}{load}")
+    said = [f"{label}: {several(some)}" for label, some in found.items()]
+    return ("A design tension is the same moving mean: snap loads, which are shorter, are not in it. Largest mean over "
+            f"one step, the start included; {'. '.join(said)}.") if said else ""
+
+
+def holds_for(s):
+    """"Holds for: ...", what is the same for all conditions once, and of what is not, the conditions; "" of none."""
+    some = [c for c in s["conditions"] if c["design"]["holds_for"]]
+    if not some:
+        return ""
+    said = zip_longest(*(c["design"]["holds_for"].split(", ") for c in some), fillvalue="")
+    return f"Holds for: {', '.join(part for texts in said for part in qualified(shared(list(zip(some, texts)))))}."
+
+
+def shared(found):
+    """Each text of [(condition, text)] once: [(text, the conditions that it is of)], these "" where it is that of all;
+    without texts that are "". Where the texts differ by the value of one key alone, that value names the conditions."""
+    names, where = [c["label"] for c, _ in found], {}
+    for key in found[0][0]["values"] if found else ():
+        of = {}
+        for c, text in found:
+            of.setdefault(c["values"][key], set()).add(text)
+        if len(of) > 1 and all(len(texts) == 1 for texts in of.values()):
+            names = [worded(key, c["values"][key], c["units"][key]) for c, _ in found]
+            break
+    for name, (_, text) in zip(names, found):
+        where.setdefault(text, {})[name] = None
+    return [(text, several(list(some)) if len(where) > 1 else "") for text, some in where.items() if text]
+
+
+def qualified(some):
+    """Texts of shared() with their conditions behind them."""
+    return [f"{text} ({where})" if where else text for text, where in some]
+
+
+def _governs(c):
+    """Conditions by this have the largest design value first: a list that is cut keeps those that govern."""
+    tow = c["design"]["tow"] or {}
+    return -tow.get("value", tow.get("largest", 0.0))
+
+
+def warnings(s):
+    """"WARNING: what is the matter: condition (how much); condition", each matter once."""
+    found, every = {}, len(s["conditions"])
+    for c in sorted(s["conditions"], key=_governs):
+        for w in c["design"]["warnings"]:
+            found.setdefault(w["what"], []).append((c["label"], w["detail"]))
+    out = []
+    for what, where in found.items():
+        details = {detail for _, detail in where}
+        if len(where) == every and len(details) == 1:
+            detail = details.pop()
+            out.append(f"WARNING: {sentence(what)}{f' ({detail})' if detail else ''}.")
+        else:
+            some = [label + (f" ({detail})" if detail else "") for label, detail in where]
+            out.append(f"WARNING: {sentence(what)}: {several(some)}.")
+    return out
+
+
+def sentence(text):
+    """With a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+def several(some):
+    """A list of texts as one, of a long one the first alone: a page of conditions is not read. What matters most comes
+    first."""
+    return "; ".join(some if len(some) <= MOST_NAMED else
+                     [*some[:MOST_NAMED - 1], f"and {len(some) - MOST_NAMED + 1} more conditions"])
+
+
+def _rows_of(s, name, cells):
+    """A row for each condition that has the load."""
+    return [[c["label"], *cells(c["loads"][name])] for c in s["conditions"] if name in c["loads"]]
+
+
+def names(s):
+    """Loads of all conditions, in the order of the files."""
+    return list(dict.fromkeys(name for c in s["conditions"] for name in c["loads"]))
+
+
+def _unit(s, name):
+    some = [c["loads"][name] for c in s["conditions"] if name in c["loads"]]
+    factor, unit = scale([np.median([abs(x["quantiles"]["95"]["value"]) for x in some])], some[0]["units"])
+    return factor, unit, some[0]
+
+
+def signals(s, markdown):
+    """Mean, standard deviation and largest value of every load."""
+    head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "in the start", "unit", "over", "hours"]
+    rows = []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        def cells(x, factor=factor, unit=unit, first=first):
+            start = x["start_up"]
+            return [first["label"], *estimate(x["mean"], factor), *estimate(x["sd"], factor),
+                    number(x["largest"] / factor), number(start and start["largest"] / factor), unit,
+                    f"{x['time_scale_s']:.3g} s", number(x["hours"])]
+        rows += _rows_of(s, name, cells)
+    if not rows:
+        return "\n".join([nothing(s), *left_out(s)])
+    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
+            "that means differ a little from those of the whole window. In the start: the largest of the means that "
+            "begin before the window, which is in no other number. 95 %: interval over fields.")
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *left_out(s), *conversions(s), *panel_lines(s)])
+
+
+def nothing(s):
+    """Why there is no row of any load."""
+    if any(c["loads_left_out"] for c in s["conditions"]):
+        return "No statistics of a load."
+    return "No loads: no member has a window with a towed body."
+
+
+def left_out(s):
+    """Sentences on what is in no number: members without a load, and loads without statistics."""
+    few, why = {}, {}
+    for c in s["conditions"]:
+        lacking = {}
+        for x in c["loads"].values():
+            lacking.setdefault((x["members"] - x["fields"], x["members"]), []).append(x["label"])
+        for (n, all_of_them), labels in lacking.items():
+            if n:
+                few.setdefault(tuple(labels), []).append(f"{c['label']} ({n} of {all_of_them})")
+        for x in c["loads_left_out"].values():
+            why.setdefault((x["label"], x["why"]), []).append(c["label"])
+    return [f"Members without {' and '.join(labels)}, or without a window of {stat_load.LEAST_SCALES} time scales in "
+            f"which they are known throughout, are in no number of these: {several(where)}."
+            for labels, where in few.items()] + [
+                f"{sentence(label)} is left out: {reason}: {several(where)}." for (label, reason), where in why.items()]
+
+
+def estimate(found, factor):
+    """Cells of a number and its interval."""
+    return number(found["value"] / factor), pair(found["interval_95"], factor)
+
+
+def quantiles(s, markdown):
+    """Quantiles of every load with their intervals."""
+    rows = []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        def cells(x, factor=factor, unit=unit, first=first):
+            cells = (estimate(x["quantiles"][str(q)], factor) for q in SHOWN)
+            return [first["label"], *(v if ends == "–" else f"{v} ({ends})" for v, ends in cells), unit]
+        rows += _rows_of(s, name, cells)
+    if not rows:
+        return nothing(s)
+    return table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, markdown) + \
+        "\n\nOf the same moving mean. Brackets: 95 %, over fields."
+
+
+def conversions(s):
+    named = sorted({(x["label"], x["conversion"]) for c in s["conditions"] for x in c["loads"].values()
+                   if x["conversion"]})
+    return [f"{label[0].upper()}{label[1:]}: a quasi-static load is the mean over a step, the peak of a collision is "
+            f"by {conversion}." for label, conversion in named]
+
+
+def panel_lines(s):
+    """The hull panel that bears most, a sentence a condition."""
+    out = []
+    for c in s["conditions"]:
+        p = c["panels"]
+        if p is None:
+            continue
+        k, most = int(np.argmax(p["mean"])), int(np.argmax(p["largest"]))
+        factor, unit = scale([p["largest"][most]], p["units"])
+        def at(j, p=p):
+            return f"panel {j} (at {p['bearing_deg'][j]:.0f}° from the body's x axis)"
+        few = "" if p["fields"] == c["members"]["used"] else f" ({p['fields']} of {c['members']['used']} fields)"
+        out.append(f"Hull panels, {c['label']}{few}: {at(k)} has the largest mean, "
+                   f"{number(p['mean'][k] / factor)} {unit} ({pair(p['mean_95'][k], factor)}); the largest mean of a "
+                   f"step is {number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
+    return out
+
+
+CUT = 0.9  # of the hours: where the blocks have less, it is said
+
+
+def cut(name, f, hours):
+    """["NAME: 12 of 20 h, and none of 3 fields"] of a fit by blocks that leaves out more than a little; [] of others.
+    name: of what, hours: of all fields."""
+    used, none = f.get("hours", hours), f.get("without_block", 0)
+    if used >= CUT * hours and not none:
+        return []
+    return [f"{name}: {number(used)} of {number(hours)} h{f', and none of {none} fields' if none else ''}"]
+
+
+def cut_note(some):
+    return [f"Blocks are of one length, what is left over is in no block: {several(some)}."] if some else []
+
+
+def returns(s, markdown):
+    """Return levels of the whole signal by both models of the tail."""
+    hours = sorted({level["hours"] for c in s["conditions"] for x in c["loads"].values()
+                    for kind in NAMES for level in x[kind].get("levels", [])})
+    if not hours:
+        refused = sorted({x[kind]["refused"] for c in s["conditions"] for x in c["loads"].values() for kind in NAMES
+                          if "refused" in x[kind]})
+        return "No return levels" + (f": {several(refused)}." if refused else ".")
+    head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
+    rows, refused, short = [], {}, []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        for kind, label in NAMES.items():
+            for c in s["conditions"]:
+                x = c["loads"].get(name)
+                if x is None:
+                    continue
+                f = x[kind]
+                if "refused" in f:
+                    refused.setdefault((first["label"], label), []).append(f"{c['label']}: {f['refused']}")
+                    continue
+                short += cut(f"{c['label']}, {first['label']}", f, x["hours"])
+                at = {level["hours"]: level for level in f["levels"]}
+                rows.append([c["label"], first["label"], label,
+                             f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+                             number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
+                             number(x["hours"])])
+    note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
+            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
+            "below 0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, profile likelihood, widened "
+            "by the scatter between fields that are alike. * beyond the hours simulated: extrapolated. ! shape below "
+            "-0.5: the levels "
+            "are little more than the largest value seen. No bound: the upper end is more than "
+            f"{text_table.FAR:g} times the level.")
+    # what to do about it is for a terminal
+    said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
+            for (load, tail), some in refused.items())
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *cut_note(short), *said])
+
+
+def level(found, factor):
+    """A return level as the statistics have it, None where there is none."""
+    if found is None or not np.isfinite(found["level"]):
+        return "–"
+    value, ends = text_table.level(found["level"], found["level_95"], factor)
+    return f"{value}{'*' if found['beyond_data'] else ''} ({ends})"

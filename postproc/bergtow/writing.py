@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Files that are written, and the one rule of what they may replace.
+
+A file that is there is replaced only if bergtow made it, or with --force. Each file carries MARK: a PNG and an MP4 in
+their texts, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_by`, Markdown in a comment. Rejected: a
+list of the files in the folder, which knows nothing of a file that was moved there.
+"""
+import csv
+import io
+import json
+import math
+import mmap
+import os
+from contextlib import contextmanager, suppress
+
+from bergtow.errors import RunError
+
+import numpy as np
+
+PICTURES = (".png", ".pdf", ".svg")
+MARK = "made by bergtow postproc, which may replace it"
+#: where matplotlib puts the mark, by the end of a picture's name
+PLACES = {".png": "Software", ".pdf": "Producer", ".svg": "Source"}
+
+
+def made_here(path):
+    """Does a file carry the mark, or nothing at all, as one that a crash or mktemp has left?"""
+    with open(path, "rb") as f:
+        if not f.seek(0, os.SEEK_END):
+            return True
+        with mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            return data.find(MARK.encode()) >= 0
+
+
+def may_write(path, force):
+    """Errors: RunError for a file that is not one of these scripts', and for what is no file at all."""
+    try:
+        if not path.exists():
+            return
+        if not path.is_file():
+            raise RunError(path, "is there already, and is no file", "choose another place with -o")
+        if force or made_here(path):
+            return
+    except OSError as error:
+        raise RunError(path, f"cannot be read ({error.strerror or error})", "choose another place with -o") from None
+    raise RunError(path, "is there already, and was not made by bergtow",
+                   "choose another place with -o, or --force to replace it")
+
+
+@contextmanager
+def written(path, force):
+    """with written(path, force) as new: write the file `new`, which takes its place when it is whole. Errors:
+    RunError."""
+    may_write(path, force)
+    new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield new
+        with open(new, "rb") as whole:
+            os.fsync(whole.fileno())  # a crash leaves the old file or the new one
+        os.replace(new, path)
+    except OSError as error:
+        raise RunError(path, f"cannot be written ({error.strerror or error})", "choose another place with -o") from None
+    finally:
+        with suppress(OSError):
+            new.unlink()
+
+
+def write_text(text, path, force):
+    """Write a text that carries the mark already. Errors: RunError."""
+    assert MARK in text
+    with written(path, force) as new:
+        new.write_text(text, encoding="utf-8")
+
+
+def plain(value):
+    """As it comes back from JSON: numbers of numpy as those of Python, what is not finite as None."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_json(value, path, force):
+    """Write a dict, and the mark with it. Errors: RunError."""
+    write_text(json.dumps({"made_by": MARK, **plain(value)}, indent=1, allow_nan=False) + "\n", path, force)
+
+
+def write_csv(rows, path, force):
+    """Write dicts of the same keys as a table, with the mark as the last column. Errors: RunError."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, [*rows[0], "made_by"])
+    table.writeheader()
+    table.writerows(row | {"made_by": MARK} for row in rows)
+    write_text(text.getvalue(), path, force)
+
+
+def write_markdown(text, path, force):
+    write_text(f"{text}\n\n<!-- {MARK} -->\n", path, force)
+
+
+def save(figure, path, force=False):
+    """Write a figure; its folder is made if missing. Errors: RunError."""
+    with written(path, force) as new:
+        figure.savefig(new, metadata={PLACES[path.suffix.lower()]: MARK})
+    print(path)
