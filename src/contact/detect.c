@@ -260,7 +260,8 @@ void bt_contacts_detect(bt_world *w, bool again)
         cell->margin = margin;
         due[n_due++] = k;
     }
-    const int threads = omp_get_max_threads();
+    // within a team of the caller the pass is that one thread's, which keeps its number
+    const int team = omp_get_num_threads(), most = omp_get_max_threads(), threads = team > most ? team : most;
     thread_scratch *scratch = bt_alloc((size_t)threads, sizeof *scratch);
     bt_phases_listed(w, due, n_due, FEW, narrow_phase, &scratch, &(bt_totals){0});
     for (int i = 0; i < threads; i++) {

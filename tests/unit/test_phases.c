@@ -283,6 +283,23 @@ static void a_small_team_does_all(void **state)
     bt_world_free(w);
 }
 
+/// Detection in a team of the caller, by a thread whose number is higher than the library's threads.
+static void a_team_of_the_caller_detects(void **state)
+{
+    (void)state;
+    uint64_t rng = 8;
+    bt_world *w = fill(&scenes[0], &rng);
+    const bt_idx contacts = w->cells->n_contacts;
+    omp_set_num_threads(1);
+#pragma omp parallel num_threads(4)
+    if (omp_get_thread_num() == 3) {
+        omp_set_num_threads(1);
+        detect_all(w, 0.1);
+    }
+    assert_int_equal(w->cells->n_contacts, contacts);
+    bt_world_free(w);
+}
+
 /// A sum over the cells, and two maxima that are negative: of the lowest cell, and of the highest.
 static void visit_busy(bt_world *w, bt_idx k, const void *visits, bt_totals *t)
 {
@@ -333,6 +350,7 @@ int main(void)
         cmocka_unit_test(the_border_is_done_before_it_is_sent),
         cmocka_unit_test(shares_follow_the_lists),
         cmocka_unit_test(a_small_team_does_all),
+        cmocka_unit_test(a_team_of_the_caller_detects),
         cmocka_unit_test(every_busy_cell_is_visited_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
