@@ -223,6 +223,8 @@ typedef struct bt_step_stats {
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
     bt_phases phases;        ///< where its wall time went; `output` is not of the step
+    bt_phases shared;        ///< of it, in passes that several threads share
+    double in_team;          ///< of the phase under way
 } bt_step_stats;
 
 typedef struct bt_world {

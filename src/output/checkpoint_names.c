@@ -23,6 +23,7 @@ static const row rows[] = {
     {"about/ranks", "1", "MPI ranks of the run", "one"},
     {"about/threads", "1", "threads of each rank", "one"},
     {"clock/phases", "s", "wall time of each phase of the steps", "phase"},
+    {"clock/shared", "s", "of it, in passes that several threads share", "phase"},
     {"clock/wall_time", "s", "wall time of the run so far", "one"},
     {"case/resolved", NULL, "the case with every key, in SI units", "one"},
     {"case/current", "s, m/s, m/s", "table of the current: time, x, y", "current_row time_x_y"},

@@ -183,6 +183,7 @@ static void write_reasons(bt_json *j, const char *key, const view *v, const void
 #define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
 #define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
 #define PHASE(name, text) MACHINE("phases_s." #name, phases.name, "s", "wall time of " text),
+#define SHARED(name, text) MACHINE("shared_s." #name, shared.name, "s", "wall time that threads shared of " text),
 #define CALL_PART(name, text) MACHINE("call_s." #name, call.name, "s", "wall time of " text),
 #define MACHINE_SUMMARY(...) {BT_JSON_AT(FROM_SUMMARY, bt_summary, __VA_ARGS__), .machine = true}
 #define WHEN(when_, ...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .when = when_}
@@ -412,6 +413,8 @@ static const bt_json_key rows[] = {
     MACHINE_SUMMARY("ns_per_floe_step", ns_per_floe_step, "ns", "wall time for each floe and step"),
     GROUP("phases_s", NULL, "wall time by phase of the step"),
     BT_WALL_PHASES(PHASE)
+    GROUP("shared_s", NULL, "of phases_s, in passes that several threads share: the rest is done by one thread"),
+    BT_WALL_PHASES(SHARED)
     GROUP("call_s", NULL, "wall time of the last call by its parts, the whole process where it ran once"),
     BT_CALL_PARTS(CALL_PART)
     TEXT("state_hash", state_hash, "hash of the state at the end, the same for any ranks and threads"),

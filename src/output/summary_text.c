@@ -14,20 +14,27 @@
 #include "case/case_derived.h"
 #include "case/warning.h"
 
-/// Shares of the wall time, in one line.
-static void print_phases(const bt_phases *p)
+/// Shares of the wall time in one line, and in another how much of each phase several threads shared.
+static void print_phases(const bt_run_totals *t)
 {
 #define NAME(name, text) #name,
-#define SECONDS(name, text) p->name,
+#define SECONDS(name, text) t->phases.name,
+#define SHARED(name, text) t->shared.name,
     const char *const names[] = {BT_WALL_PHASES(NAME)};
-    const double seconds[] = {BT_WALL_PHASES(SECONDS)};
+    const double seconds[] = {BT_WALL_PHASES(SECONDS)}, shared[] = {BT_WALL_PHASES(SHARED)};
 #undef NAME
 #undef SECONDS
+#undef SHARED
     const int n = sizeof names / sizeof *names;
     double sum = 0;
     for (int i = 0; i < n; i++) sum += seconds[i];
     for (int i = 0; i < n; i++)
         printf(" %s %.1f %%%s", names[i], sum > 0 ? 100 * seconds[i] / sum : 0.0, i + 1 < n ? "," : "\n");
+    if (t->threads < 2) return;
+    printf("  shared by threads  ");
+    for (int i = 0; i < n; i++)
+        printf(" %s %.0f %%%s", names[i], seconds[i] > 0 ? bt_min(100, 100 * shared[i] / seconds[i]) : 0.0,
+               i + 1 < n ? "," : "\n");
 }
 
 /// Reported series that not every run has, and what the table calls them.
@@ -185,7 +192,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);
     printf("\n ");
-    print_phases(&t->phases);
+    print_phases(t);
     printf("  state hash          %016" PRIx64 "\n", t->state_hash);
     for (size_t i = 0; i < s->warnings.n; i++) printf("  warning: %s\n", s->warnings.text[i]);
 }

@@ -96,6 +96,7 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_er
         bt_snapshot_add_int(s, "run/locked_steps", r->guard.locked);
         bt_snapshot_add_real(s, "run/energy_limit", r->guard.energy);
         bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
+        bt_snapshot_add(s, "clock/shared", BT_ITEM_F64, N_PHASES, 1, &r->totals.shared);
         bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->began);
         if (status == BT_OK) status = bt_record_save(r->record, r->frames, s, err);
         bt_snapshot_end(s, err);
@@ -177,7 +178,7 @@ static void check_frames(const bt_running *r, bt_snapshot *s)
 static void check_counters(const bt_running *r, bt_snapshot *s)
 {
     double sum = 0;
-#define ADD(name, text) sum += r->totals.phases.name;
+#define ADD(name, text) sum += r->totals.phases.name + r->totals.shared.name;
     BT_WALL_PHASES(ADD)
 #undef ADD
     check_frames(r, s);
@@ -186,7 +187,7 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
     bt_snapshot_want(s, r->guard.locked >= 0 && r->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
                      "is no number of steps");
     bt_snapshot_want(s, !(r->guard.energy < 0), "run/energy_limit", -1, "is no energy");
-    bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "are not all finite");
+    bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "and clock/shared are not all finite");
     bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");
 }
 
@@ -199,6 +200,7 @@ bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err)
     r->guard.locked = bt_snapshot_int(s, "run/locked_steps");
     r->guard.energy = bt_snapshot_real(s, "run/energy_limit");
     bt_snapshot_take(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
+    bt_snapshot_take(s, "clock/shared", BT_ITEM_F64, N_PHASES, 1, &r->totals.shared);
     r->totals.wall_time = bt_snapshot_real(s, "clock/wall_time");
     check_counters(r, s);
     return bt_state_load(r->w, r->comm, s, err);

@@ -265,9 +265,9 @@ static bt_status agree(run *r, bt_status status)
     return bits & 1 ? bt_comm_agree(r->comm, status) : BT_OK;
 }
 
-static void add_phases(bt_phases *p, const bt_step_stats *st)
+static void add_phases(bt_run_totals *t, const bt_step_stats *st)
 {
-#define ADD(name, text) p->name += st->phases.name;
+#define ADD(name, text) t->phases.name += st->phases.name, t->shared.name += st->shared.name;
     BT_WALL_PHASES(ADD)
 #undef ADD
 }
@@ -334,7 +334,8 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     bt_world *w = r->w;
     bt_status status = BT_OK;
     step_at_pace(w, &r->pace);
-    add_phases(&r->totals.phases, &w->stats);
+    add_phases(&r->totals, &w->stats);
+    w->stats.in_team = 0;
     const double t0 = bt_clock();
     if (w->step == r->o->dump_step) status = dump(r, err);
     bt_sample *const s = &r->sample;
@@ -353,6 +354,7 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     if (status == BT_OK && saves && bt_running_goes_on(r)) status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
     bt_progress_step(&r->progress, w->step, s->time, s->ice_resistance);
     r->totals.phases.output += bt_clock() - t0;
+    r->totals.shared.output += w->stats.in_team;
     return status;
 }
 

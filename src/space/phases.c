@@ -226,6 +226,7 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *t)
         run(o);
         return;
     }
+    const double t0 = bt_clock();
 #pragma omp parallel num_threads(o->n_shares)
     {
         bt_totals own = {.n_sums = t->n_sums, .most = t->most, .most2 = t->most2};
@@ -237,6 +238,7 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *t)
 #pragma omp critical
         bt_totals_merge(t, &own);
     }
+    o->w->stats.in_team += bt_clock() - t0;
 }
 
 /// The reference: what the schedule above comes to, without threads, shares, or an exchange under way.

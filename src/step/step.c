@@ -200,9 +200,12 @@ static void balance(bt_world *w)
 /// Add to a phase the time since *t0, less what was spent waiting for other ranks, which has its own entry.
 static void clock_phase(bt_world *w, double *phase, double *t0)
 {
+    bt_step_stats *st = &w->stats;
     const double now = bt_clock(), waited = bt_domain_exchange_time(w);
     *phase += now - *t0 - waited;
-    w->stats.phases.exchange += waited;
+    ((double *)&st->shared)[phase - (double *)&st->phases] += st->in_team;
+    st->phases.exchange += waited;
+    st->in_team = 0;
     *t0 = now;
 }
 
@@ -255,7 +258,8 @@ static void solve_contacts(bt_world *w)
 void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
-    st->phases = (bt_phases){0};
+    st->phases = st->shared = (bt_phases){0};
+    st->in_team = 0;
     bt_domain_exchange_time(w); // waited since the last step, for its record: not in the time of this one
     double t0 = bt_clock();
     bt_environment_begin(w); // U_w, U_a

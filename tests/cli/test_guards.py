@@ -158,7 +158,7 @@ def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):
         assert call("resume", tmp_path / "bits", "--quiet", "--steps", 8).returncode in (DONE, SIGNAL)
     assert call("resume", tmp_path / "bits", "--quiet").returncode == DONE
     parts = Run(tmp_path / "bits", None)
-    clocks = {"wall_time_s", "phases_s", "call_s", "ns_per_floe_step", "memory_per_floe_b"}
+    clocks = {"wall_time_s", "phases_s", "shared_s", "call_s", "ns_per_floe_step", "memory_per_floe_b"}
     assert {k: v
             for k, v in parts.summary.items()
             if k not in clocks} == {k: v

@@ -41,6 +41,7 @@ def test_summary_has_its_names_and_types(finished):
     for name in WHOLE:
         assert isinstance(s[name], int) and not isinstance(s[name], bool), name
     assert list(s["phases_s"]) == PHASES and all(v >= 0 for v in s["phases_s"].values())
+    assert set(s["shared_s"].values()) == {0}, "one thread shares nothing"
     assert re.fullmatch("[0-9a-f]{16}", s["state_hash"])
     assert isinstance(s["warnings"], list) and s["stopped"] is None
 

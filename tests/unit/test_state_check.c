@@ -367,7 +367,8 @@ static void numbers_of_a_run_are_refused_by_name(void **state)
     } wrong[] = {{"run/unconverged_in_a_row", 0, -1}, {"run/unconverged_in_a_row", 0, 1e18},
                  {"run/energy_limit", 0, -1},         {"run/frames_due", 0, -1},
                  {"run/frames_due", 0, 1000},         {"stall/windows", 0, -1},
-                 {"clock/phases", 1, NAN},            {"clock/wall_time", 0, NAN},
+                 {"clock/phases", 1, NAN},            {"clock/shared", 1, NAN},
+                 {"clock/wall_time", 0, NAN},
                  {"clock/wall_time", 0, INFINITY}};
     bt_errors err = {0};
     bt_snapshot s, later;
