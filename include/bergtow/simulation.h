@@ -192,8 +192,8 @@ bt_status bt_record_keep(const char *folder, const char *name, const void *made_
 /// missing or changed; BT_ERR_IO.
 bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n);
 
-/// One process at a time in a folder of many runs: the lock DIR/lock holds until the descriptor *lock is closed here and
-/// in every process that has inherited it. Errors: BT_ERR_IO, which names the process that has it.
+/// One process at a time in a folder of many runs: the lock DIR/lock holds until the descriptor *lock is closed here,
+/// and in every process that has inherited it. Errors: BT_ERR_IO, which names the process that has it.
 bt_status bt_folder_lock(const char *dir, int *lock);
 
 /// Release a text that one of these has given. NULL is ignored.
