@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 SONAME = "libbergtow.so.0"
 LOADS = 10  # BT_APPLIED_NUMBERS
-CONTACT_COLUMNS = 12  # BT_CONTACT_COLUMNS
-MOST_THREADS = 1024  # BT_MOST_THREADS
 
 
 class Options(ctypes.Structure):
@@ -139,8 +137,9 @@ def threads_here(asked: int) -> int:
     """Threads for a simulation that begins: in a fork of a process that had simulations one alone, for a team of more
     would wait for those that the fork has left behind."""
     global team
-    if not 0 <= asked <= MOST_THREADS:  # before the library has it as a number of 32 bits
-        raise BergtowError(f"threads: {asked} cannot be had; give 1 to {MOST_THREADS}, or 0 for run.threads of the "
+    most = limit("threads")
+    if not 0 <= asked <= most:  # before the library has it as a number of 32 bits
+        raise BergtowError(f"threads: {asked} cannot be had; give 1 to {most}, or 0 for run.threads of the "
                            "case or all cores")
     if team in (None, os.getpid()):
         if asked != 1:
@@ -223,7 +222,7 @@ def listed(what: str) -> dict[str, Any]:
 
 
 def limit(name: str) -> Any:
-    """A number by which the program judges windows, domains and maps."""
+    """A number by which the program judges windows, domains and maps, or a size of what it takes and gives."""
     return listed("limits")[name]
 
 

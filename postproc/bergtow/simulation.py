@@ -299,7 +299,7 @@ class Simulation:
         """Contacts of the last step, an array of the type CONTACT; those without impulse might have come about."""
         with _library.LOCK:
             n = self._library.bt_simulation_contacts(self._s, None, 0)
-            rows = np.empty((n, _library.CONTACT_COLUMNS))
+            rows = np.empty((n, _library.limit("contact_columns")))
             self._library.bt_simulation_contacts(self._s, _pointer(rows), n)
         out = np.empty(n, CONTACT)
         out["a"], out["b"], out["n_points"] = rows[:, 0], rows[:, 1], rows[:, 2]

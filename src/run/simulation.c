@@ -560,6 +560,8 @@ static char *limits_json(void)
     bt_json_number(&j, "window_drift", BT_STEADY_MATERIAL);
     bt_json_number(&j, "locking_body_widths", BT_ARCH_LOCKING);
     bt_json_number(&j, "map_farthest_m", BT_MAP_FARTHEST);
+    bt_json_int(&j, "threads", BT_MOST_THREADS);
+    bt_json_int(&j, "contact_columns", BT_CONTACT_COLUMNS);
     bt_json_string(&j, "map_local_crs", BT_MAP_LOCAL_NAME);
     bt_json_open(&j, "map_words_near_thickness", '[');
     for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&j, NULL, bt_map_near_thickness[k]);
