@@ -177,8 +177,8 @@ static void check_frames(const bt_running *r, bt_snapshot *s)
 /// What the loop of the run goes by.
 static void check_counters(const bt_running *r, bt_snapshot *s)
 {
-    double sum = 0;
-#define ADD(name, text) sum += r->totals.phases.name + r->totals.shared.name;
+    double sum = 0, shared = 0;
+#define ADD(name, text) sum += r->totals.phases.name, shared += r->totals.shared.name;
     BT_WALL_PHASES(ADD)
 #undef ADD
     check_frames(r, s);
@@ -187,7 +187,8 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
     bt_snapshot_want(s, r->guard.locked >= 0 && r->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
                      "is no number of steps");
     bt_snapshot_want(s, !(r->guard.energy < 0), "run/energy_limit", -1, "is no energy");
-    bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "and clock/shared are not all finite");
+    bt_snapshot_want(s, isfinite(sum), "clock/phases", -1, "are not all finite");
+    bt_snapshot_want(s, isfinite(shared), "clock/shared", -1, "are not all finite");
     bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");
 }
 
