@@ -83,7 +83,7 @@ void bt_fuzz_begin_run(const uint8_t *data, size_t n, const char *const *set, in
     bt_errors err = {0};
     bt_status status = bt_case_read(&c, file.path, set, n_set, &err);
     bt_fuzz_reported(status, &err);
-    if (status == BT_OK && !names_files(&c) && bt_case_expected_floes(&c) < 60 && c.n_floes < 20) {
+    if (status == BT_OK && !names_files(&c) && bt_case_floes_made(&c) < 60 && c.n_floes < 20) {
         // Few sweeps and little shaking, so that many inputs are tried.
         c.ice.shake = bt_min(c.ice.shake, 0.5);
         if (c.solver.max_sweeps > 20) c.solver.max_sweeps = 20;
