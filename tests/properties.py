@@ -390,7 +390,7 @@ def as_seen(table, folder, seed, parts, number, seen):
     # A friction that is not unique, a step that is not solved, or one whose turns leave a corner in another floe, which
     # the projection finds or not by rounding: nothing can be said of what comes after it.
     for s in (series, again):
-        left = np.append(s["overlap"][1:], 0) > 1e-3 * floe_size(case)
+        left = np.append(s["overlap"][1:], 0) > 1e-4 * floe_size(case)
         unsolved = np.flatnonzero(s["unconverged"] + s["unprojected"] + s["restitution_cut"] + s["outrun"] + left)
         frames = min([frames, *(unsolved[:1] + 1)])
     steps = frames - 1

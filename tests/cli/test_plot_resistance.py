@@ -34,6 +34,8 @@ def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
     numbers |= {
         "estimates": reported["estimates"], "estimate_labels": reported["estimate_labels"],
         "mean_ice_resistance_n": mean, "mean_ice_resistance_se_n": se, "concentration": concentration, "warnings": [],
+        "mean_ice_resistance_low_n": None if se is None else mean - 1.96 * se,
+        "mean_ice_resistance_high_n": None if se is None else mean + 1.96 * se,
         "reference": None
     } | summary
     (run / "summary.json").write_text(json.dumps(numbers))

@@ -17,8 +17,8 @@ def test_two_ranks_are_refused(tmp_path, command):
     write_case(tmp_path, CASE)
     result = mpirun(2, command, "case.yml", "-o", "out", cwd=tmp_path)
     assert result.returncode == USAGE and not result.stdout
-    assert ours(result) == [f"bergtow: {command}: is no program of ranks; call it without mpirun or srun: what runs it "
-                            "needs it starts itself, as many at a time as --jobs says"]
+    assert ours(result) == [f"bergtow: {command}: does not run under MPI; call it without mpirun or srun: it "
+                            "starts the runs that it needs, --jobs at a time"]
     assert [p.name for p in tmp_path.iterdir()] == ["case.yml"]
 
 
