@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // How many threads work at a run: fewer than it was given while others use the cores.
 //
-// Threads meet at a barrier for each colour of each sweep, some hundred times a step. When other programs want the
-// cores, the system takes the thread that all wait for off its core for milliseconds, each time; a run with two threads
-// then took ten times as long as with one. No way of waiting helps, as the one waited for does not run.
+// Threads wait for each other in every pass, some hundred times a step. When other programs want the cores, the system
+// takes the thread that all wait for off its core for milliseconds, each time; a run with two threads then took ten
+// times as long as with one. No way of waiting helps, as the one waited for does not run.
 //
 // So threads are tried out: where they get too little of the processors, half of them work for a moment, and go on so
 // if more gets done in a second of wall time; later twice as many are tried. Trials that fail become rare. The result
