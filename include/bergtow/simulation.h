@@ -165,7 +165,7 @@ const char *bt_last_error(void);
 /// with bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved, char **values);
 
-/// The case of a simulation, as `resolved` of bt_case_check_text; of one that goes on, that of its checkpoint. Release
+/// The case of a simulation, as `resolved` of bt_case_check_text; of a resumed one, that of its checkpoint. Release
 /// with bt_release.
 char *bt_simulation_case(const bt_simulation *s);
 
