@@ -77,6 +77,18 @@ bool bt_domain_owns(const bt_world *w, bt_idx i)
     return !w->domain || !w->domain->distributed || w->domain->owned[i];
 }
 
+void bt_domain_follow(bt_world *w, const bt_idx *from)
+{
+    bt_domain *d = w->domain;
+    if (!d || !d->distributed) return;
+    const bt_idx n = w->bodies.n;
+    uint8_t *owned = bt_alloc((size_t)n, sizeof *owned);
+    for (bt_idx i = 0; i < n; i++) owned[i] = d->owned[from[i]];
+    free(d->owned);
+    d->owned = owned;
+    d->cap_owned = n;
+}
+
 // --- sums ------------------------------------------------------------------------------------------------------------
 
 void bt_domain_maxima(const bt_world *w, double *x, int n)

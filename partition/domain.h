@@ -47,6 +47,9 @@ enum { BT_VALIDATE_STEPS = 20 };
 /// Does this rank answer for body i?
 bool bt_domain_owns(const bt_world *w, bt_idx i);
 
+/// Body i of this rank is, or is a piece of, the one that was stored at from[i]: its owner is the same.
+void bt_domain_follow(bt_world *w, const bt_idx *from);
+
 /// Collective. Maxima over the ranks.
 void bt_domain_maxima(const bt_world *w, double *x, int n);
 /// Collective. Totals of a pass over the ranks.

@@ -123,25 +123,6 @@ static void unpack(bt_bodies *b, const char *data, size_t n_bytes)
     }
 }
 
-/// Keep only the bodies that `keep` says, in their order.
-static void compact(bt_bodies *b, const uint8_t *keep)
-{
-    bt_idx n = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (!keep[i]) continue;
-        if (n != i) {
-            for (int k = 0; k < bt_bodies_n_fields(b); k++)
-                memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
-            const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
-            for (int k = 0; k < bt_n_vertex_fields; k++)
-                memmove(vertices_of(b, k, to), vertices_of(b, k, from), (size_t)m * bt_vertex_fields[k].size);
-            b->offset[n + 1] = to + m;
-        }
-        n++;
-    }
-    b->n = n;
-}
-
 /// Give back the memory of bodies that have gone.
 static void shrink(bt_bodies *b)
 {
@@ -186,7 +167,7 @@ static void move_bodies(bt_world *w)
         d->stats.moved += d->distributed && bt_division_owner(w, b->cell[i][0], b->cell[i][1]) != me;
     }
     for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;
-    compact(b, keep);
+    bt_bodies_compact(b, keep);
     free(keep);
     size_t n_in;
     char *in = deliver(d->comm, &p, 1, &n_in);

@@ -231,10 +231,14 @@ void bt_domain_check(bt_world *w)
         gid[n++] = b->gid[i];
         mixed += ((uint64_t)b->gid[i] + 1) * UINT64_C(0x9e3779b97f4a7c15) >> 7;
     }
-    for (bt_gid g = 0; g < b->n_global; g++) wanted += ((uint64_t)g + 1) * UINT64_C(0x9e3779b97f4a7c15) >> 7;
+    bt_gid there = 0;
+    for (bt_gid g = 0; g < b->n_global; g++) {
+        there += !b->gone[g];
+        wanted += b->gone[g] ? 0 : ((uint64_t)g + 1) * UINT64_C(0x9e3779b97f4a7c15) >> 7;
+    }
     bt_sum sums[2] = {{.v = n}, {.v = (bt_int128)mixed}};
     bt_comm_reduce(d->comm, sums, 2, NULL, 0, NULL, 0);
-    if ((bt_gid)sums[0].v != b->n_global || (uint64_t)sums[1].v != wanted) {
+    if ((bt_gid)sums[0].v != there || (uint64_t)sums[1].v != wanted) {
         int64_t *first = bt_alloc((size_t)d->comm->size + 1, sizeof *first);
         for (int r = 0; r <= d->comm->size; r++) first[r] = bt_comm_first(d->comm, r, b->n_global);
         double *rows = bt_alloc((size_t)n, sizeof *rows),
@@ -245,7 +249,7 @@ void bt_domain_check(bt_world *w)
                       "step %" PRId64 ": after a migration %" PRId64 " of %" PRId64
                       " bodies are owned; this is an error of the program: report the case, and go on with another "
                       "number of ranks",
-                      w->step, (int64_t)sums[0].v, b->n_global);
+                      w->step, (int64_t)sums[0].v, there);
         end_all(d->comm, &err);
     }
     free(gid);

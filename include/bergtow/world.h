@@ -11,9 +11,9 @@
 // from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large
 // bodies (walls and the towed body among them).
 //
-// Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
-// gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
-// wall's own coefficients prevail over the ice's).
+// Generated floes have the lowest gids, from 0 on. Ids for the pieces of floes that split, floes given by hand, the
+// towed body and walls follow: a pair (a, b) is kept with gid[a] < gid[b], and takes friction and restitution from b,
+// the body with the higher gid (so the towed body's and a wall's own coefficients prevail over the ice's).
 #ifndef BERGTOW_WORLD_H
 #define BERGTOW_WORLD_H
 
@@ -123,8 +123,10 @@ typedef struct bt_bodies {
     int32_t *lap;
     bt_home *home;        ///< [n] with a moving window, otherwise NULL
     int64_t cap_vertices;
-    bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
-    bt_gid n_global;
+    bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank, or no body
+    uint8_t *gone;        ///< [n_global] 1 = no body has this id, on any rank: of a floe that has split, or of no piece yet
+    bt_gid n_global;      ///< ids
+    bt_gid cap_global;
 } bt_bodies;
 
 /// Most contact laws, the program's own included; most that are added (contact.h); numbers `own` of one law; numbers
@@ -177,6 +179,7 @@ struct bt_undisturbed;
 struct bt_impacts;
 struct bt_environment;
 struct bt_forces;
+struct bt_splitting;
 
 /// Where the wall time of a run goes: X(name, what is in it).
 #define BT_WALL_PHASES(X)                                                                                              \
@@ -240,6 +243,7 @@ typedef struct bt_world {
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_shore *shore;  ///< fixed bodies that lie against each other (space/shore.h), NULL = none
+    struct bt_splitting *splitting; ///< floes that split (step/splitting.h), NULL = none does
     struct bt_impacts *impacts; ///< loads of the towed body by collisions and without (impact.h), NULL = as a whole
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done

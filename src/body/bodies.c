@@ -37,6 +37,7 @@ void bt_bodies_free(bt_bodies *b)
     for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)b + bt_vertex_fields[k].array));
     free(b->offset);
     free(b->index_of);
+    free(b->gone);
 }
 
 void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
@@ -117,22 +118,43 @@ static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
     }
 }
 
+/// Ids up to n_global + n have a place in index_of.
+static void make_ids(bt_bodies *b, bt_gid n)
+{
+    if (b->n_global + n <= b->cap_global) return;
+    b->cap_global = 2 * b->cap_global > b->n_global + n ? 2 * b->cap_global : b->n_global + n;
+    b->index_of = bt_realloc(b->index_of, (size_t)b->cap_global, sizeof *b->index_of);
+    b->gone = bt_realloc(b->gone, (size_t)b->cap_global, sizeof *b->gone);
+}
+
+void bt_bodies_skip(bt_bodies *b, bt_gid n)
+{
+    make_ids(b, n);
+    for (bt_gid g = b->n_global; g < b->n_global + n; g++) b->index_of[g] = -1, b->gone[g] = 1;
+    b->n_global += n;
+}
+
 bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 {
+    make_ids(b, 1);
+    return bt_bodies_put(b, d, b->n_global++);
+}
+
+bt_gid bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid)
+{
+    assert(gid >= 0 && gid < b->n_global);
     assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
     assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
-    assert(b->n == b->n_global); // bodies are added before they are distributed to ranks
     int64_t first = b->offset[b->n];
     const int n_vertices = d->n_vertices + (d->parts ? d->parts->n_vertices : 0);
     bt_bodies_reserve(b, b->n + 1, first + n_vertices);
     const bt_idx i = b->n++;
-    if ((b->n_global & (b->n_global - 1)) == 0) // a power of two: room for twice as many
-        b->index_of = bt_realloc(b->index_of, 2 * (size_t)b->n_global + 2, sizeof *b->index_of);
-    b->index_of[b->n_global] = i;
+    b->index_of[gid] = i;
+    b->gone[gid] = 0;
     b->offset[i + 1] = first + n_vertices;
     add_polygons(b, i, d);
     bt_moments m = bt_shape_extent(d->n_vertices, d->vertices);
-    b->gid[i] = b->n_global++;
+    b->gid[i] = gid;
     b->pose[i] = (bt_pose){.x = d->x, .y = d->y, .yaw = d->yaw};
     b->vel[i] = b->vel_start[i] = b->vel_free[i] =
         d->motion == BT_STATIC ? (bt_vel){0} : (bt_vel){.x = d->vx, .y = d->vy, .w = d->yaw_rate};
@@ -154,7 +176,31 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
     b->cell[i][0] = b->cell[i][1] = 0;
     b->lap[i] = 0;
     bt_bodies_turn(b, i);
-    return b->gid[i];
+    return gid;
+}
+
+void bt_bodies_compact(bt_bodies *b, const uint8_t *keep)
+{
+    bt_idx n = 0;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!keep[i]) continue;
+        if (n != i) {
+            for (int k = 0; k < bt_bodies_n_fields(b); k++) {
+                char *array = *(char **)((char *)b + bt_body_fields[k].array);
+                const size_t size = bt_body_fields[k].size;
+                memcpy(array + (size_t)n * size, array + (size_t)i * size, size);
+            }
+            const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
+            for (int k = 0; k < bt_n_vertex_fields; k++) {
+                char *array = *(char **)((char *)b + bt_vertex_fields[k].array);
+                const size_t size = bt_vertex_fields[k].size;
+                memmove(array + (size_t)to * size, array + (size_t)from * size, (size_t)m * size);
+            }
+            b->offset[n + 1] = to + m;
+        }
+        n++;
+    }
+    b->n = n;
 }
 
 void bt_bodies_turn(bt_bodies *b, bt_idx i)

@@ -30,8 +30,15 @@ void bt_bodies_free(bt_bodies *b);
 /// Room for the homes of all bodies, 0, before they are distributed to ranks.
 void bt_bodies_make_homes(bt_bodies *b);
 
-/// Add a body (bt_world_add); returns its gid.
+/// Add a body (bt_world_add); returns its gid. Before bodies are distributed to ranks.
 bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);
+/// Keep the next n ids for bodies that are put there later.
+void bt_bodies_skip(bt_bodies *b, bt_gid n);
+/// A body at the end of the storage, with an id that no body here has; returns it.
+bt_gid bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid);
+/// Leave out the bodies that keep [n] does not say, and close the gaps: the others stay in their order. index_of is not
+/// brought up to date.
+void bt_bodies_compact(bt_bodies *b, const uint8_t *keep);
 
 /// Outline of body i turned by its yaw (after a change of pose).
 void bt_bodies_turn(bt_bodies *b, bt_idx i);

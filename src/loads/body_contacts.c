@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Contacts of the towed body as a step leaves them: where, how hard, how fast; see loads/impact.h for the equations.
 #include "loads/body_contacts.h"
+#include "loads/collision.h"
 #include "base/inside.h"
 
 #include <math.h>
@@ -21,37 +22,6 @@ typedef struct {
     double c, s; ///< of the yaw of the towed body at X1
 } contact_rows;
 
-/// Interior angle of the outline of body i, rad, where vertex v of its part stands; NaN when there is no such vertex.
-/// Parts have no corners of their own: a cut leads from one corner of the outline to another.
-static double interior_angle(const bt_bodies *b, bt_idx i, int part, uint32_t v)
-{
-    const bt_mark *mark = b->mark + b->offset[i] + part;
-    const uint32_t count = mark->count;
-    if (v > count) return NAN;
-    const int n = bt_body_corners(b, i), k = mark[v < count ? v : 0].corner; // v = count: the end of the last edge
-    const double *o = b->outline + 2 * b->offset[i], *at = o + 2 * k, *before = o + 2 * (k ? k - 1 : n - 1),
-                 *after = o + 2 * (k + 1 < n ? k + 1 : 0);
-    const double px = at[0] - before[0], py = at[1] - before[1], qx = after[0] - at[0], qy = after[1] - at[1];
-    return BT_PI - bt_atan2(px * qy - py * qx, px * qx + py * qy);
-}
-
-/// Interior angle of the corner that makes a contact point of a pair of parts: features as manifold.c numbers them. Of
-/// two corners that meet, the sharper.
-static double corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2], uint32_t feature)
-{
-    if ((feature >> 20) == 0x7ffu)
-        return bt_min(interior_angle(b, u->a, part[0], (feature >> 10) & 0x3ffu),
-                      interior_angle(b, u->b, part[1], feature & 0x3ffu));
-    const bool reference_b = feature >> 31, of_reference = feature & 1u, of_b = reference_b == of_reference;
-    return interior_angle(b, of_b ? u->b : u->a, part[of_b], (feature & 0xfffffu) >> 1);
-}
-
-/// Masses without the drag that the solver's contain: a collision is short against the step.
-static bt_inv bare(const bt_bodies *b, bt_idx i)
-{
-    return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
-}
-
 static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, bt_idx j,
                               bt_idx towed, double c, double s)
 {
@@ -59,23 +29,11 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
     const bt_contact *u = &cell->contacts[j];
     const bool is_b = u->b == towed;
     const bt_idx other = is_b ? u->a : u->b;
-    const double sign = is_b ? 1 : -1, total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};
-    const bt_inv ia = bare(b, u->a), ib = bare(b, u->b);
-    double v1 = 0, v2 = 0, ran = 0, rbn = 0, arm = 0;
-    for (int i = 0; i < u->n; i++) {
-        v1 += share[i] * bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
-        v2 += share[i] * bt_normal_velocity(u, i, &b->vel[u->a], &b->vel[u->b]);
-        ran += share[i] * u->ran[i];
-        rbn += share[i] * u->rbn[i];
-    }
-    arm = is_b ? rbn : ran;
-    const double effect = ia.m + ib.m + ia.i * ran * ran + ib.i * rbn * rbn;
-    const double coupled = effect + (ia.i * ran * u->rat + ib.i * rbn * u->rbt) * (u->lt / total);
-    double collision = 0;
-    if (v1 < 0 && v2 > v1) collision = coupled > 0 ? bt_min(total, (v2 - v1) / coupled) : total;
+    const double sign = is_b ? 1 : -1;
+    const bt_collision q = bt_collision_of(w, u);
 
     // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
-    const double along = is_b ? u->rbt : u->rat;
+    const double along = is_b ? u->rbt : u->rat, arm = is_b ? q.rbn : q.ran;
     const double nx = c * u->nx + s * u->ny, ny = c * u->ny - s * u->nx;
     bt_body_contact t = {
         .gid = (double)b->gid[other],
@@ -83,15 +41,15 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
         .y = along * ny - arm * nx,
         .nx = sign * nx,
         .ny = sign * ny,
-        .normal = total,
+        .normal = u->ln[0] + u->ln[1],
         .friction = u->lt,
-        .collision = collision,
-        .approach = bt_max(0, -v1),
-        .rest = bt_max(0, -v2),
-        .mass = 1 / effect,
+        .collision = q.impulse,
+        .approach = q.approach,
+        .rest = q.rest,
+        .mass = q.mass,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, cell->search.pairs[u->pair].part,
-                            cell->gaps[j].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner = bt_contact_corner_of(b, u, cell->search.pairs[u->pair].part,
+                               cell->gaps[j].feature[u->n > 1 && u->ln[1] > u->ln[0]]).angle,
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];

@@ -14,15 +14,20 @@
 #define TURNED                                                                                                         \
     1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
 
+bt_impact_rule bt_impact_rule_of(const bt_case *c)
+{
+    return (bt_impact_rule){.conversion = c->impact.conversion, .duration = c->impact.duration,
+                            .pressure = c->impact.pressure, .real_corner = c->impact.corner == BT_CORNER_REAL,
+                            .corner_angle = c->impact.corner_angle, .least_speed = c->impact.least_speed};
+}
+
 bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w)
 {
     const bt_idx towed = bt_world_towed(w);
     if (towed < 0 || c->impact.conversion == BT_IMPACT_NONE) return NULL;
     bt_impacts *m = bt_alloc(1, sizeof *m);
     *m = (bt_impacts){
-        .rule = {.conversion = c->impact.conversion, .duration = c->impact.duration, .pressure = c->impact.pressure,
-                 .real_corner = c->impact.corner == BT_CORNER_REAL, .corner_angle = c->impact.corner_angle,
-                 .least_speed = c->impact.least_speed},
+        .rule = bt_impact_rule_of(c),
         .dt = w->par.dt,
         .tolerance = w->par.tolerance,
         .sheet = c->ice.density * (1 + c->ice.added_mass),
@@ -46,8 +51,7 @@ void bt_impacts_free(bt_impacts *m)
 
 // --- force of a collision --------------------------------------------------------------------------------------------
 
-/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
-static void convert(const bt_impact_rule *r, bt_impact *e)
+void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
 {
     if (!r->real_corner || !(e->corner > 0 && e->corner < BT_PI)) e->corner = r->corner_angle;
     if (r->conversion == BT_IMPACT_CRUSHING) {
@@ -81,7 +85,7 @@ static void close_event(bt_impacts *m, const bt_impact_open *o)
     bt_impact *e = &m->closed[m->n_closed++];
     *e = o->so_far;
     e->panel = bt_panels_at(&m->panels, e->x, e->y);
-    convert(&m->rule, e);
+    bt_impact_convert(&m->rule, e);
 }
 
 /// Contacts t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that

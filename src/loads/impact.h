@@ -106,6 +106,10 @@ typedef struct bt_impacts {
     int64_t n_open;
 } bt_impacts;
 
+bt_impact_rule bt_impact_rule_of(const bt_case *c);
+/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
+void bt_impact_convert(const bt_impact_rule *r, bt_impact *e);
+
 /// For the towed body of world w; NULL when the case asks for none, or there is no body.
 bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w);
 void bt_impacts_free(bt_impacts *m);

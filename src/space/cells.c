@@ -533,20 +533,39 @@ static void place(bt_world *w, bt_memory *memory, int64_t n)
     t->labelled = true;
 }
 
-/// With `renew` new cells and labels, otherwise only new owners.
-static void relabel(bt_world *w, bool renew, double margin)
+/// New cells and labels, for this memory, which is released.
+static void renew(bt_world *w, double margin, bt_memory *memory, int64_t n)
 {
-    bt_cells *t = w->cells;
-    if (renew) {
-        choose(w, margin);
-        label(w);
-        t->n_labellings++;
-    }
+    choose(w, margin);
+    label(w);
+    w->cells->n_labellings++;
+    drop_parted(w, memory, &n);
+    place(w, memory, n);
+    w->cells->relabel = false;
+}
+
+static void relabel(bt_world *w, double margin)
+{
     int64_t n;
     bt_memory *memory = bt_cells_take_memory(w, &n);
-    if (renew) drop_parted(w, memory, &n);
+    renew(w, margin, memory, n);
+}
+
+/// New owners of the cells there are.
+static void hand_on(bt_world *w)
+{
+    int64_t n;
+    bt_memory *memory = bt_cells_take_memory(w, &n);
     place(w, memory, n);
-    t->relabel = false;
+    w->cells->relabel = false;
+}
+
+void bt_cells_change(bt_world *w, bt_bodies_change *change, const void *context)
+{
+    int64_t n;
+    bt_memory *memory = bt_cells_take_memory(w, &n);
+    memory = change(w, memory, &n, context);
+    renew(w, w->par.slop, memory, n);
 }
 
 void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n) { place(w, memory, n); }
@@ -556,9 +575,9 @@ void bt_cells_begin(bt_world *w)
     bt_cells *t = w->cells;
     if (!t->labelled || t->relabel) {
         if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
-        relabel(w, true, w->par.slop);
+        relabel(w, w->par.slop);
     } else if (w->exchange && w->exchange->due(w)) {
-        relabel(w, false, 0);
+        hand_on(w);
     }
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_cells_wake_all(t);
@@ -567,6 +586,6 @@ void bt_cells_begin(bt_world *w)
 bool bt_cells_update(bt_world *w, double margin)
 {
     if (margin <= w->cells->margin_max) return false;
-    relabel(w, true, margin);
+    relabel(w, margin);
     return true;
 }

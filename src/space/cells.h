@@ -256,6 +256,11 @@ void bt_cells_begin(bt_world *w);
 /// changed.
 bool bt_cells_update(bt_world *w, double margin);
 
+/// What is done to the bodies that this rank holds, and to its memory of contacts [*n], which it takes and returns.
+typedef bt_memory *bt_bodies_change(bt_world *w, bt_memory *memory, int64_t *n, const void *context);
+/// Collective. New labels, storage and cells after bodies have been put in the place of others. Indices change.
+void bt_cells_change(bt_world *w, bt_bodies_change *change, const void *context);
+
 /// Cell k, or every cell, is looked at from now on.
 void bt_cells_wake(bt_cells *t, bt_idx k);
 void bt_cells_wake_all(bt_cells *t);
