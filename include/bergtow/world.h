@@ -190,7 +190,8 @@ struct bt_splitting;
     X(advance, "balances, the record of forces and collisions, motion")                                                \
     X(exchange, "waiting for other ranks")                                                                             \
     X(output, "series, checks, frames and checkpoints")                                                                \
-    X(project, "what gives way, and the position projection")
+    X(project, "what gives way, and the position projection")                                                          \
+    X(split, "loads of the floes, and floes that split")
 
 /// Wall time by phase, s.
 typedef struct bt_phases {

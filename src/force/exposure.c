@@ -621,6 +621,7 @@ bt_exposure bt_exposure_mean(const bt_world *w, bt_gid n_floes)
     double water = 0, air = 0, sheltered[2] = {0, 0};
     for (bt_gid g = 0; g < n_floes; g++) {
         const bt_idx i = bt_world_index(w, g);
+        if (i < 0) continue;
         const double wx = p->water_u - b->vel[i].x, wy = p->water_v - b->vel[i].y, ax = p->air_u - b->vel[i].x,
                      ay = p->air_v - b->vel[i].y;
         lines l;

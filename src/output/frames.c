@@ -268,12 +268,13 @@ static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt
         const double c = bt_cos(row[i].yaw), sine = bt_sin(row[i].yaw);
         const int corners = outline_of(f, i, local, p);
         local += corners;
+        const bool gone = isnan(row[i].x); // a floe that has split: all of it in one point
         for (int v = 0; v < corners; v++) {
             float *to = bt_rows_next(&r);
             double drawn[2];
             bt_map_axes_point(&f->axes, row[i].x + c * (double)p[2 * v] - sine * (double)p[2 * v + 1],
                               row[i].y + sine * (double)p[2 * v] + c * (double)p[2 * v + 1], drawn);
-            to[0] = (float)drawn[0], to[1] = (float)drawn[1];
+            to[0] = gone ? 0 : (float)drawn[0], to[1] = gone ? 0 : (float)drawn[1];
         }
     }
     bt_rows_end(&r);
@@ -338,6 +339,12 @@ static void write_line(bt_frames *f, const bt_frame_line *line)
     bt_h5_append(f->h, f->line_tension, H5T_NATIVE_DOUBLE, (hsize_t)f->n, 1, line->tension);
 }
 
+char *bt_frames_group(const bt_frames *f, char path[64])
+{
+    snprintf(path, 64, "/xdmf/%06lld", (long long)f->n);
+    return path;
+}
+
 bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line)
 {
     bt_h5 *h = f->h;
@@ -349,9 +356,6 @@ bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, con
     bt_slab_grow(&f->speed, f->n);
     bt_slab_grow(&f->velocity, f->n);
     bt_slab_grow(&f->net_force, f->n);
-    char path[64];
-    snprintf(path, sizeof path, "/xdmf/%06lld", (long long)f->n);
-    bt_h5_group(h, path);
     paraview floes = create_paraview(f, "floe", f->n_floes, f->floe_vertices, true);
     paraview others = create_paraview(f, "body", f->n_others, f->other_vertices, false);
     bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity,

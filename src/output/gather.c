@@ -11,65 +11,87 @@
 
 #include "output/observe.h"
 #include "partition/domain.h"
+#include "step/splitting.h"
 #include "tow/tow.h"
 #include "base/elementary.h"
 
 typedef struct list {
-    bt_idx n;       ///< bodies this rank speaks for
-    bt_gid *gid;    ///< [n]
-    bt_idx *body;   ///< [n]
+    bt_idx n;       ///< bodies this rank speaks for: rank 0 also for floes that have split
+    bt_gid *row;    ///< [n] among all rows (bt_roster_row)
+    int64_t *body;  ///< [n]; of a floe that has split −1 − the split (step/splitting.h)
     int64_t *first; ///< [ranks + 1] blocks
     int64_t count;  ///< bodies of this rank's block
 } list;
 
 static list make_list(const bt_comm *c, const bt_world *w, const bt_roster *roster)
 {
-    list l = {.gid = bt_alloc((size_t)w->bodies.n, sizeof *l.gid),
-              .body = bt_alloc((size_t)w->bodies.n, sizeof *l.body),
+    const bt_splitting *s = w->splitting;
+    const size_t most = (size_t)w->bodies.n + (s ? (size_t)s->n : 0);
+    list l = {.row = bt_alloc(most, sizeof *l.row), .body = bt_alloc(most, sizeof *l.body),
               .first = bt_alloc((size_t)c->size + 1, sizeof *l.first)};
     for (bt_idx i = 0; i < w->bodies.n; i++) {
-        if (!bt_domain_owns(w, i)) continue;
-        l.gid[l.n] = w->bodies.gid[i];
+        const bt_gid row = bt_roster_row(roster, w->bodies.gid[i]);
+        if (row < 0 || !bt_domain_owns(w, i)) continue;
+        l.row[l.n] = row;
         l.body[l.n++] = i;
     }
-    bt_record_blocks(c, roster->n_floes, (bt_idx)w->bodies.n_global, l.first);
+    for (int64_t k = 0; s && k < s->n && c->rank == 0; k++) {
+        if (s->split[k].generation > 1) continue;
+        l.row[l.n] = bt_roster_row(roster, s->split[k].parent);
+        l.body[l.n++] = -1 - k;
+    }
+    bt_record_blocks(c, roster->n_floes, (bt_idx)(w->bodies.n_global - roster->n_kept), l.first);
     l.count = l.first[c->rank + 1] - l.first[c->rank];
     return l;
 }
 
 static void free_list(list *l)
 {
-    free(l->gid);
+    free(l->row);
     free(l->body);
     free(l->first);
 }
 
-static int most_vertices(const bt_comm *c, const bt_bodies *b)
+/// Its outline in its own frame; returns the number of vertices.
+static int outline_of(const bt_world *w, int64_t body, const double **v)
+{
+    if (body < 0) {
+        *v = bt_splitting_outline(w->splitting, -1 - body, 2);
+        return (int)w->splitting->split[-1 - body].corners[2];
+    }
+    *v = w->bodies.vertices + 2 * w->bodies.offset[body];
+    return bt_body_corners(&w->bodies, (bt_idx)body);
+}
+
+static int most_vertices(const bt_comm *c, const bt_world *w, const list *l)
 {
     double most = 0;
-    for (bt_idx i = 0; i < b->n; i++) most = bt_max(most, bt_body_corners(b, i));
+    const double *v;
+    for (bt_idx i = 0; i < l->n; i++) most = bt_max(most, outline_of(w, l->body[i], &v));
     bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
     return (int)most;
 }
 
 /// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
-static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const list *l, const int64_t *offsets,
+static bt_status hand_over_vertices(const bt_comm *c, const bt_world *w, const list *l, const int64_t *offsets,
                                     double *vertices, bt_errors *err)
 {
     enum { PORTION = 4 };
-    const int most = most_vertices(c, b);
+    const int most = most_vertices(c, w, l);
     double(*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows),
     (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
     bt_status status = BT_OK;
     for (int from = 0; from < most && status == BT_OK; from += PORTION) {
-        for (bt_idx i = 0; i < l->n; i++)
+        for (bt_idx i = 0; i < l->n; i++) {
+            const double *v;
+            const int n = outline_of(w, l->body[i], &v);
             for (int k = 0; k < PORTION; k++) {
-                const int64_t v = b->offset[l->body[i]] + from + k;
-                const bool there = from + k < bt_body_corners(b, l->body[i]); // the outline, not its parts
-                rows[i][k][0] = there ? b->vertices[2 * v] : 0;
-                rows[i][k][1] = there ? b->vertices[2 * v + 1] : 0;
+                const bool there = from + k < n;
+                rows[i][k][0] = there ? v[2 * (from + k)] : 0;
+                rows[i][k][1] = there ? v[2 * (from + k) + 1] : 0;
             }
-        status = bt_comm_rows_by_gid(c, l->first, l->n, l->gid, 2 * PORTION, &rows[0][0][0], &block[0][0][0], err);
+        }
+        status = bt_comm_rows_by_gid(c, l->first, l->n, l->row, 2 * PORTION, &rows[0][0][0], &block[0][0][0], err);
         for (int64_t i = 0; i < l->count; i++)
             for (int k = 0; k < PORTION; k++) {
                 const int64_t v = offsets[i] + from + k;
@@ -90,12 +112,14 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
     list l = make_list(c, w, roster);
     double (*rows)[3] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[3] = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {
-        const bt_idx k = l.body[i];
-        rows[i][0] = bt_body_corners(b, k);
-        rows[i][1] = roster->thickness[l.gid[i]];
-        rows[i][2] = b->area[k];
+        const int64_t k = l.body[i];
+        const double *v;
+        const int n = outline_of(w, k, &v);
+        rows[i][0] = n;
+        rows[i][1] = roster->thickness[l.row[i]];
+        rows[i][2] = k < 0 ? bt_shape_extent(n, v).area : b->area[k];
     }
-    bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, 3, &rows[0][0], &block[0][0], err);
+    bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.row, 3, &rows[0][0], &block[0][0], err);
     int64_t *offsets = bt_alloc((size_t)l.count + 1, sizeof *offsets);
     double *thickness = bt_alloc((size_t)l.count, sizeof *thickness), *area = bt_alloc((size_t)l.count, sizeof *area);
     for (int64_t i = 0; i < l.count; i++) {
@@ -106,17 +130,17 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
     free(rows);
     free(block);
     double *vertices = bt_alloc(2 * (size_t)offsets[l.count], sizeof *vertices);
-    if (status == BT_OK) status = hand_over_vertices(c, b, &l, offsets, vertices, err);
+    if (status == BT_OK) status = hand_over_vertices(c, w, &l, offsets, vertices, err);
     free_list(&l);
     *out = (bt_record_bodies){.n_floes = roster->n_floes,
-                              .n_bodies = (bt_idx)b->n_global,
+                              .n_bodies = (bt_idx)(b->n_global - roster->n_kept),
                               .offsets = offsets,
                               .vertices = vertices,
                               .thickness = thickness,
                               .area = area,
                               .names = roster->names,
-                              .all = c->size == 1 ? b : NULL,
-                              .towed = (bt_idx)w->towed,
+                              .all = c->size == 1 && !w->splitting ? b : NULL, // none of whose floes goes
+                              .towed = w->towed < 0 ? -1 : (bt_idx)bt_roster_row(roster, w->towed),
                               .branches = bt_tow_has_line(w->tow) ? w->tow->n_branches : 0};
     if (status != BT_OK) bt_gather_free(out);
     return status;
@@ -131,33 +155,66 @@ void bt_gather_free(bt_record_bodies *b)
     *b = (bt_record_bodies){0};
 }
 
+/// Body k in a frame; k < 0: a floe that has split.
+static bt_frame_row row_of(const bt_bodies *b, int64_t k, const double *force, double (*net)[2])
+{
+    if (k < 0) return (bt_frame_row){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    return (bt_frame_row){
+        .x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
+        .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y, .fx = net[k][0],
+        .fy = net[k][1]};
+}
+
+static int by_piece(const void *p, const void *q)
+{
+    const bt_piece_row *a = p, *b = q;
+    return (a->piece > b->piece) - (a->piece < b->piece);
+}
+
+/// Collective. Pieces there are, in the order of their ids, on rank 0.
+static bt_piece_row *gather_pieces(const bt_comm *c, const bt_world *w, const double *force, double (*net)[2],
+                                   int64_t *n)
+{
+    *n = 0;
+    const bt_splitting *s = w->splitting;
+    if (!s) return NULL;
+    const bt_bodies *b = &w->bodies;
+    bt_piece_row *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    int64_t count = 0;
+    for (bt_idx i = 0; i < b->n; i++) {
+        const bt_gid k = b->gid[i] - s->first;
+        if (k < 0 || k >= s->reserve || !bt_domain_owns(w, i)) continue;
+        mine[count++] = (bt_piece_row){(double)k, row_of(b, i, force, net)};
+    }
+    bt_piece_row *all = (bt_piece_row *)(void *)bt_comm_gather(c, count, 1 + BT_FRAME_ROW,
+                                                               (const double *)(const void *)mine, n);
+    free(mine);
+    if (*n > 0) qsort(all, (size_t)*n, sizeof *all, by_piece);
+    return all;
+}
+
 bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out,
-                            bt_errors *err)
+                          bt_piece_row **pieces, int64_t *n_pieces, bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;
     double *force = bt_alloc((size_t)b->n, sizeof *force);
     double (*net)[2] = bt_alloc((size_t)b->n, sizeof *net);
     bt_observe_contact_force(w, force);
-    bt_observe_net_force(c, w, roster->n_free, net);
+    bt_observe_net_force(c, w, roster, net);
     if (w->stats.locked) // the contacts of this step have no solution
         for (bt_idx i = 0; i < b->n; i++) force[i] = net[i][0] = net[i][1] = NAN;
     list l = make_list(c, w, roster);
     const bool alone = c->size == 1; // all bodies are of one block: each row is put where it belongs
     bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);
-    for (bt_idx i = 0; i < l.n; i++) {
-        const bt_idx k = l.body[i];
-        rows[alone ? l.gid[i] : i] = (bt_frame_row){
-            .x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
-            .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y, .fx = net[k][0],
-            .fy = net[k][1]};
-    }
+    for (bt_idx i = 0; i < l.n; i++) rows[alone ? l.row[i] : i] = row_of(b, l.body[i], force, net);
+    *pieces = gather_pieces(c, w, force, net, n_pieces);
     free(force);
     free(net);
     bt_frame_row *block = rows;
     bt_status status = BT_OK;
     if (!alone) {
         block = bt_alloc((size_t)l.count, sizeof *block);
-        status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
+        status = bt_comm_rows_by_gid(c, l.first, l.n, l.row, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
         free(rows);
     }
     free_list(&l);

@@ -13,9 +13,11 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
                              bt_errors *err);
 void bt_gather_free(bt_record_bodies *b);
 
-/// Collective. A frame of this rank's block; *rows is to be freed, NULL after an error. Errors as above.
+/// Collective. A frame of this rank's block, with NaN for floes that have split; and on rank 0 the pieces of floes
+/// [*n_pieces] that are there, in the order of their ids. *rows and *pieces are to be freed, NULL after an error or
+/// without any. Errors as above.
 bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **rows,
-                            bt_errors *err);
+                          bt_piece_row **pieces, int64_t *n_pieces, bt_errors *err);
 
 /// The tow line beside it, the same on all ranks; zeros without one.
 bt_frame_line bt_gather_line(const bt_world *w);

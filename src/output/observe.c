@@ -257,10 +257,13 @@ void bt_observe_contact_force(const bt_world *w, double *force)
     bt_domain_largest(w, force);
 }
 
-void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, double (*force)[2])
+/// Which of the bodies after the floes that move freely, < 0: such a floe, or a piece of one.
+static bt_gid other_of(const bt_roster *r, bt_gid gid) { return bt_roster_row(r, gid) - r->n_free; }
+
+void bt_observe_net_force(const bt_comm *c, const bt_world *w, const bt_roster *roster, double (*force)[2])
 {
     const bt_bodies *b = &w->bodies;
-    const int others = (int)(b->n_global - n_free);
+    const int others = (int)(b->n_global - roster->n_kept - roster->n_free);
     bt_sum *sum = bt_alloc(2 * (size_t)others, sizeof *sum);
     for (bt_idx k = 0; k < w->cells->n; k++) {
         const bt_cell *cell = &w->cells->cell[k];
@@ -270,7 +273,7 @@ void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, do
             bt_impulse_on_b(u, &jx, &jy);
             const bt_idx side[] = {u->a, u->b};
             for (int s = 0; s < 2; s++) {
-                const bt_gid other = b->gid[side[s]] - n_free;
+                const bt_gid other = other_of(roster, b->gid[side[s]]);
                 if (other < 0) continue;
                 bt_sum_add(&sum[2 * other], s ? jx : -jx);
                 bt_sum_add(&sum[2 * other + 1], s ? jy : -jy);
@@ -279,7 +282,7 @@ void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, do
     }
     bt_comm_reduce(c, sum, 2 * others, NULL, 0, NULL, 0);
     for (bt_idx i = 0; i < b->n; i++) {
-        const bt_gid other = b->gid[i] - n_free;
+        const bt_gid other = other_of(roster, b->gid[i]);
         const double m = b->inv[i].m;
         if (other >= 0) {
             for (int k = 0; k < 2; k++) force[i][k] = bt_sum_value(&sum[2 * other + k]) / w->par.dt;

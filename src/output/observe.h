@@ -4,6 +4,7 @@
 #define BERGTOW_OBSERVE_H
 
 #include "output/record.h"
+#include "output/roster.h"
 #include "bergtow/world.h"
 
 /// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.
@@ -18,9 +19,9 @@ double bt_observe_ice_area(const bt_world *w);
 /// Collective. Largest normal contact force on each body of this rank in the step just done, N. force: [n bodies].
 void bt_observe_contact_force(const bt_world *w, double *force);
 
-/// Collective. Sum of all contact forces on each body in the last step, N, to force [n]: of the first n_free bodies
-/// from their momentum, m (U2 - U*) / dt, which needs no order of their contacts; of the others, few, which may be led
-/// or fixed, from their contacts. As the last step left it: 0 before the first.
-void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_free, double (*force)[2]);
+/// Collective. Sum of all contact forces on each body in the last step, N, to force [n]: of floes that move
+/// freely from their momentum, m (U2 - U*) / dt, which needs no order of their contacts; of the others, few, which may
+/// be led or fixed, from their contacts. As the last step left it: 0 before the first.
+void bt_observe_net_force(const bt_comm *c, const bt_world *w, const bt_roster *roster, double (*force)[2]);
 
 #endif

@@ -112,6 +112,7 @@ static bt_status close_file(bt_record *r)
         if (r->events[k] >= 0) H5Dclose(r->events[k]);
     bt_frames_close(&r->frames);
     bt_impact_store_close(&r->impacts);
+    bt_piece_store_close(&r->pieces);
     return bt_h5_close(&r->h5);
 }
 
@@ -220,6 +221,15 @@ bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, 
     return open_record(r, comm, dir, c, b, command_line, NULL, false, err);
 }
 
+bt_status bt_record_watch_splitting(bt_record *r, const struct bt_splitting *s, const struct bt_roster *roster,
+                                    bt_errors *err)
+{
+    if (r->comm->rank != 0) return BT_OK;
+    r->h5.err = err;
+    bt_piece_store_create(&r->pieces, &r->h5, s, roster, r->c->run.dt, &r->frames.axes);
+    return r->h5.status;
+}
+
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err)
 {
     if (r->comm->rank != 0) return BT_OK;
@@ -236,6 +246,7 @@ void bt_record_flush(bt_record *r)
     r->written += r->buffered;
     r->buffered = 0;
     bt_impact_store_write(&r->impacts);
+    bt_piece_store_write(&r->pieces);
     bt_h5_flush(&r->h5);
     r->frames_waiting = 0;
     r->last_flush = bt_clock();
@@ -276,15 +287,24 @@ void bt_record_overlap(bt_record *r, double overlap)
 }
 
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
-                          bt_errors *err)
+                          const bt_piece_row *pieces, int64_t n_pieces, bt_errors *err)
 {
     r->h5.err = err;
-    const bt_status status = bt_frames_add(&r->frames, time, rows, line);
+    const bt_status status = bt_record_add_frame(r, time, rows, line, pieces, n_pieces);
     if (status != BT_OK) return status;
     if (r->comm->rank == 0 &&
         (++r->frames_waiting == FRAMES_WAITING || bt_clock() - r->last_flush > FRAME_SECONDS))
         bt_record_flush(r);
     return bt_comm_agree(r->comm, r->h5.status);
+}
+
+bt_status bt_record_add_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
+                              const bt_piece_row *pieces, int64_t n_pieces)
+{
+    bt_h5_group(&r->h5, bt_frames_group(&r->frames, (char[64]){0}));
+    // a reader counts frames by their times, which come last
+    if (r->comm->rank == 0) bt_piece_store_frame(&r->pieces, pieces, n_pieces);
+    return bt_frames_add(&r->frames, time, rows, line);
 }
 
 static void write_totals(bt_record *r, const bt_run_totals *t)
@@ -303,7 +323,8 @@ char *bt_record_xdmf(const bt_record *r)
     const bt_frames *f = &r->frames;
     return bt_xdmf_text(&(bt_xdmf){.n_floes = f->n_floes, .n_bodies = f->n_others, .floe_vertices = f->floe_vertices,
                                    .body_vertices = f->other_vertices, .towed = f->towed, .branches = f->branches,
-                                   .axes = f->axes, .time = f->times, .line = f->lines, .n_frames = f->n});
+                                   .axes = f->axes, .time = f->times, .line = f->lines, .n_frames = f->n,
+                                   .pieces = r->pieces.h ? r->pieces.frame : NULL});
 }
 
 /// What is still on its way goes to the file, and the numbers of the whole run are made: on rank 0.

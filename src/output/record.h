@@ -149,6 +149,12 @@ typedef struct bt_frame_row {
 } bt_frame_row;
 enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
 
+/// A piece of a floe in a frame.
+typedef struct bt_piece_row {
+    double piece;            ///< which, from 0
+    bt_frame_row row;
+} bt_piece_row;
+
 /// The tow line in a frame: each branch from the hull to its towing end, or at the hull alone once it is broken.
 enum { BT_FRAME_BRANCHES = 2 };
 typedef struct bt_frame_line {
@@ -244,6 +250,13 @@ bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e
 /// on it.
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err);
 
+struct bt_roster;
+struct bt_splitting;
+/// Store floes that split, and their pieces (src/output/piece_store.h), from s, which must stay valid until the record
+/// is closed, as must the roster. Before the first frame. The status is that of rank 0: agree on it.
+bt_status bt_record_watch_splitting(bt_record *r, const struct bt_splitting *s, const struct bt_roster *roster,
+                                    bt_errors *err);
+
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
 /// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, and with every 16th
 /// frame or the first after half a second, so that a running or interrupted result.part.h5 can be read. After a failure
@@ -264,9 +277,10 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 /// /frames/velocity and /frames/net_force [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2],
 /// /frames/line_tension [T][k]; and for ParaView in single precision with all vertices as drawn (/xdmf, see
 /// src/output/xdmf.c).
-/// line: the same on all ranks, read where there are branches. The status is the same on all ranks.
+/// line: the same on all ranks, read where there are branches. pieces [n_pieces]: on rank 0 (bt_record_watch_splitting).
+/// The status is the same on all ranks.
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
-                          bt_errors *err);
+                          const bt_piece_row *pieces, int64_t n_pieces, bt_errors *err);
 
 /// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t =
 /// NULL closes a run that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no

@@ -8,6 +8,7 @@
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/impact_store.h"
+#include "output/piece_store.h"
 #include "output/summary.h"
 
 enum { BT_RECORD_BUFFER = 256 }; ///< entries of the series between flushes, and in a chunk
@@ -37,6 +38,7 @@ struct bt_record {
     int64_t n_events;      ///< written
     bt_frames frames;
     bt_impact_store impacts;
+    bt_piece_store pieces;
     // of the end of the run
     bt_summary summary;
     bt_impact_count count; ///< collisions over the window
@@ -44,6 +46,10 @@ struct bt_record {
 
 /// What is buffered into the file, and the file to the system.
 void bt_record_flush(bt_record *r);
+
+/// Collective. A frame, with the pieces of floes in it, on rank 0.
+bt_status bt_record_add_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
+                              const bt_piece_row *pieces, int64_t n_pieces);
 
 /// frames.xdmf for the frames there are; the caller frees it.
 char *bt_record_xdmf(const bt_record *r);

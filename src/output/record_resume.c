@@ -211,13 +211,19 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
         bt_frame_line line = {0};
         if (first) read_frame(old, k, n_floes, n_bodies, &time, rows);
         if (first) read_line(old, k, r->frames.branches, &line);
+        int64_t n_pieces = 0;
+        bt_piece_row *pieces = first && r->pieces.h ? bt_piece_store_read(old, k, &n_pieces) : NULL;
         status = bt_comm_agree(r->comm, first ? old->status : BT_OK);
-        if (status != BT_OK) break;
+        if (status != BT_OK) {
+            free(pieces);
+            break;
+        }
         bt_comm_bcast(r->comm, &time, sizeof time);
         bt_comm_bcast(r->comm, &line, sizeof line);
         status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, BT_FRAME_ROW, (const double *)(const void *)rows,
                                      (double *)(void *)block, err);
-        if (status == BT_OK) status = bt_frames_add(&r->frames, time, block, &line);
+        if (status == BT_OK) status = bt_record_add_frame(r, time, block, &line, pieces, n_pieces);
+        free(pieces);
     }
     free(blocks);
     free(rows);

@@ -6,6 +6,8 @@
 //     /xdmf/floes, /xdmf/bodies     mixed topology
 //     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
 //     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN
+//     /xdmf/NNNNNN/pieces, piece_...                                             pieces of floes that have split
+// A floe that has split shrinks to a point there: its cell stays, as ids are places in the list.
 // Thickness and height are those of /floes and /bodies; what belongs to a few bodies (ids, which one is towed) and the
 // ends of the tow line stand in the XML itself. Vectors have a third component, 0, as ParaView's vectors have.
 // Floes and other bodies are two blocks, because only floes have the largest force of a contact. Each frame has
@@ -60,16 +62,16 @@ static void begin_xml(FILE *f, int64_t n, int width, const char *type, int bytes
     fprintf(f, "\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">", type, bytes);
 }
 
-/// Floes or other bodies of one frame: kind "floe" or "body".
-static void begin_block(FILE *f, const char *name, const char *kind, int64_t cells, int64_t points, int64_t frame)
+/// Floes or other bodies of one frame: kind "floe" or "body". topology: the dataset.
+static void begin_block(FILE *f, const char *name, const char *kind, const char *topology, int64_t cells,
+                        int64_t points, int64_t frame)
 {
     char path[64];
-    snprintf(path, sizeof path, "/xdmf/%s", name);
     fprintf(f,
             "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
             "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n            ",
             name, cells);
-    data_item(f, points + 2 * cells, 1, "Int", 4, path);
+    data_item(f, points + 2 * cells, 1, "Int", 4, topology);
     fputs("\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
     snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_points", frame, kind);
     data_item(f, points, 2, "Float", 4, path);
@@ -83,10 +85,25 @@ static void floes(FILE *f, const bt_xdmf *x, int64_t frame)
 {
     const int64_t n = x->n_floes;
     if (n == 0) return;
-    begin_block(f, "floes", "floe", n, x->floe_vertices, frame);
+    begin_block(f, "floes", "floe", "/xdmf/floes", n, x->floe_vertices, frame);
     of_frame(f, n, "contact_force", 1, frame, "floe", "force");
     attribute(f, n, "thickness", "Float", 8, "/floes/thickness");
     attribute(f, n, "id", "Int", 4, "/xdmf/floe_id");
+    fputs("        </Grid>\n", f);
+}
+
+/// The pieces of floes that are there.
+static void pieces(FILE *f, const bt_xdmf *x, int64_t frame)
+{
+    if (!x->pieces || x->pieces[frame].cells == 0) return;
+    const int64_t n = x->pieces[frame].cells;
+    char path[64];
+#define OF_FRAME(name) (snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/" name, frame), path)
+    begin_block(f, "pieces", "piece", OF_FRAME("pieces"), n, x->pieces[frame].points, frame);
+    of_frame(f, n, "contact_force", 1, frame, "piece", "force");
+    attribute(f, n, "thickness", "Float", 4, OF_FRAME("piece_thickness"));
+    attribute(f, n, "id", "Int", 4, OF_FRAME("piece_id"));
+#undef OF_FRAME
     fputs("        </Grid>\n", f);
 }
 
@@ -104,7 +121,7 @@ static void in_xml(FILE *f, const bt_xdmf *x, const char *name, bool ids)
 static void bodies(FILE *f, const bt_xdmf *x, int64_t frame)
 {
     if (x->n_bodies == 0) return;
-    begin_block(f, "bodies", "body", x->n_bodies, x->body_vertices, frame);
+    begin_block(f, "bodies", "body", "/xdmf/bodies", x->n_bodies, x->body_vertices, frame);
     attribute(f, x->n_bodies, "height", "Float", 8, "/bodies/height");
     in_xml(f, x, "id", true);
     in_xml(f, x, "towed", false);
@@ -165,6 +182,7 @@ char *bt_xdmf_text(const bt_xdmf *x)
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
                    "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);
         floes(f, x, i);
+        pieces(f, x, i);
         bodies(f, x, i);
         line(f, x, i);
         fputs("      </Grid>\n", f);

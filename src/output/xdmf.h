@@ -6,6 +6,11 @@
 #include "output/map_axes.h"
 #include "output/record.h"
 
+/// Pieces of floes in a frame.
+typedef struct bt_piece_count {
+    int64_t cells, points;
+} bt_piece_count;
+
 /// Sizes of what result.h5 holds.
 typedef struct bt_xdmf {
     int64_t n_floes, n_bodies;                 ///< cells: floes, other bodies
@@ -16,6 +21,7 @@ typedef struct bt_xdmf {
     const double *time;                        ///< [n_frames] s
     const bt_frame_line *line;                 ///< [n_frames], where there are branches
     int64_t n_frames;
+    const struct bt_piece_count *pieces;       ///< [n_frames] NULL: floes do not split
 } bt_xdmf;
 
 /// What stands before each polygon in XDMF's mixed topology: this, the number of its vertices, then the vertices.

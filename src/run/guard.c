@@ -76,7 +76,7 @@ static double energy_of(double mass, double inertia, double vx, double vy, doubl
 }
 
 /// E_0 + Σ ½ M v². Of a run that goes on, too, E_0 is that of time zero.
-static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
+static double driven_energy(const bt_case *c, const bt_world *w, const bt_roster *r)
 {
     const drivers d = drivers_of(c);
     const bt_bodies *b = &w->bodies;
@@ -84,7 +84,7 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] != BT_DYNAMIC || !bt_domain_owns(w, i)) continue;
         double start = 0;
-        const bt_gid by_hand = b->gid[i] - (n_floes - c->n_floes);
+        const bt_gid by_hand = bt_roster_row(r, b->gid[i]) - r->n_free;
         // A velocity that is not given is that of free drift, below the driven speed.
         if (b->gid[i] == w->towed)
             start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy),
@@ -98,11 +98,11 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
     return UNIT * bt_sum_value(&t.sum[0]);
 }
 
-void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_floes, double mean_size)
+void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, const bt_roster *r)
 {
     *g = (bt_guard){
-        .overlap = c->guard.overlap * mean_size,
-        .energy = c->guard.energy * driven_energy(c, w, n_floes),
+        .overlap = c->guard.overlap * r->mean_size,
+        .energy = c->guard.energy * driven_energy(c, w, r),
         .unconverged = c->guard.unconverged,
         .most_locked = c->guard.no_solution > 0 ? (int64_t)(c->guard.no_solution * (double)bt_case_steps(c)) : -1,
         .escape_x = c->guard.escape && c->domain.ends == BT_BOUND_WALL,
@@ -112,8 +112,8 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
         .low = {c->domain.x0, c->domain.y0},
         .high = {c->domain.x0 + c->domain.length, c->domain.y0 + c->domain.width},
         .closing = {c->domain.ends_closing, c->domain.sides_closing},
-        .n_floes = n_floes,
-        .size = mean_size,
+        .n_floes = r->n_floes + r->n_kept,
+        .size = r->mean_size,
         .in_a_row = g->in_a_row,
         .locked = g->locked,
         .broken = -1,

@@ -41,6 +41,7 @@
 
 #include "bergtow/case.h"
 #include "output/record.h"
+#include "output/roster.h"
 #include "bergtow/world.h"
 
 typedef struct bt_guard {
@@ -61,7 +62,7 @@ typedef struct bt_guard {
 } bt_guard;
 
 /// Collective. Limits for the world of a case, all of whose bodies have been distributed.
-void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_floes, double mean_size);
+void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, const bt_roster *r);
 
 /// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors:
 /// BT_ERR_NUMERIC.

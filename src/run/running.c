@@ -84,6 +84,8 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     status = bt_comm_agree(r->comm, bt_record_identify(r->record, r->identity, err));
     if (status == BT_OK && r->w->impacts)
         status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    if (status == BT_OK && r->w->splitting)
+        status = bt_comm_agree(r->comm, bt_record_watch_splitting(r->record, r->w->splitting, &r->roster, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
     if (status != BT_OK) bt_record_abandon(r->record);
     return status;
@@ -95,10 +97,14 @@ static bt_status record_frame(run *r, bt_errors *err)
     r->framed = r->w->step;
     bt_solver_rest(r->w);
     bt_frame_row *rows;
-    bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
+    bt_piece_row *pieces;
+    int64_t n_pieces;
+    bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, &pieces, &n_pieces, err);
     const bt_frame_line line = bt_gather_line(r->w);
-    if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, &line, err);
+    if (status == BT_OK)
+        status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, &line, pieces, n_pieces, err);
     free(rows);
+    free(pieces);
     return status;
 }
 
@@ -211,7 +217,7 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
     const double energy = r->guard.energy; // of the start, from a checkpoint
-    bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
+    bt_guard_begin(&r->guard, r->c, r->w, &r->roster);
     if (energy > 0) r->guard.energy = energy;
     clock_part(r, &r->totals.call.record);
     r->began = r->clocked;
@@ -367,7 +373,7 @@ static int64_t count_outside(const run *r)
     const bt_case *c = r->c;
     int64_t n = 0, all;
     for (bt_idx i = 0; i < b->n; i++) {
-        if (b->gid[i] >= r->roster.n_floes || !bt_domain_owns(r->w, i)) continue;
+        if (bt_roster_row(&r->roster, b->gid[i]) >= r->roster.n_floes || !bt_domain_owns(r->w, i)) continue;
         const bool x_out = b->pose[i].x < c->domain.x0 || b->pose[i].x > c->domain.x0 + c->domain.length;
         const bool y_out = b->pose[i].y < c->domain.y0 || b->pose[i].y > c->domain.y0 + c->domain.width;
         n += (x_out && r->w->par.period_x == 0) || (y_out && r->w->par.period_y == 0);

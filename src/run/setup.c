@@ -108,7 +108,7 @@ static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roste
         if (f->outlines.split && !bt_outline_convex(n, d.vertices) && bt_outline_split(n, d.vertices, &parts))
             d.parts = &parts;
         d.large = sqrt(f->area[i] / BT_PI) > 0.5 * LARGE_RATIO * r->mean_size;
-        r->thickness[bt_world_add(w, &d)] = f->thickness[i];
+        r->thickness[bt_roster_row(r, bt_world_add(w, &d))] = f->thickness[i];
     }
 }
 
@@ -167,7 +167,7 @@ static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
         bt_parts parts;
         if (!bt_outline_convex(n, v) && bt_outline_split(n, v, &parts)) d.parts = &parts;
         d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
-        r->thickness[bt_world_add(w, &d)] = g->thickness;
+        r->thickness[bt_roster_row(r, bt_world_add(w, &d))] = g->thickness;
     }
     free(outline);
     bt_shore_create(w);
@@ -210,7 +210,7 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
         d.yaw_rate = 0;
     }
     w->towed = bt_world_add(w, &d);
-    r->thickness[w->towed] = c->body.draft + c->body.sail;
+    r->thickness[bt_roster_row(r, w->towed)] = c->body.draft + c->body.sail;
 }
 
 static void add_wall(const bt_case *c, bt_world *w, double x, double y, double half_x, double half_y, double vx,
@@ -231,24 +231,24 @@ static void add_wall(const bt_case *c, bt_world *w, double x, double y, double h
 }
 
 /// Does body i begin with its free drift?
-static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, bt_idx n_field)
+static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, const bt_roster *r)
 {
-    const bt_gid g = w->bodies.gid[i];
+    const bt_gid g = w->bodies.gid[i], row = bt_roster_row(r, g);
     if (c->ice.start != BT_START_DRIFT || w->bodies.motion[i] != BT_DYNAMIC) return false;
-    return g < n_field || (g == w->towed ? isnan(c->body.vx) : isnan(c->floes[g - n_field].vx));
+    return row < r->n_free || (g == w->towed ? isnan(c->body.vx) : isnan(c->floes[row - r->n_free].vx));
 }
 
-/// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given.
+/// Free drift to the floes of the field, and to floes by hand and a free body whose velocity is not given.
 /// Ice between walls has nowhere to drift across them: it has been there for long, and lies against one of them. False
 /// when it was not found.
-static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors *err)
+static bool begin_drift(const bt_case *c, bt_world *w, const bt_roster *r, bt_errors *err)
 {
     bt_bodies *b = &w->bodies;
     const bool hold[2] = {c->domain.ends == BT_BOUND_WALL, c->domain.sides == BT_BOUND_WALL};
     bt_idx lost = 0;
 #pragma omp parallel for schedule(dynamic, 64) reduction(+ : lost) if (BT_MANY(b->n, 2000))
     for (bt_idx i = 0; i < b->n; i++) {
-        if (!begins_adrift(c, w, i, n_field)) continue;
+        if (!begins_adrift(c, w, i, r)) continue;
         double u[2];
         if (!bt_drift_velocity(w, i, hold, u)) lost++;
         b->vel[i] = b->vel_start[i] = b->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = b->vel[i].w};
@@ -263,16 +263,18 @@ static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors
 
 /// Floes in company. In a field their lee and their drift follow from each other: from the drift of lone floes, in
 /// rounds, every floe with the factors of all (exposure.h), which undisturbed ice keeps.
-static bool begin_sheltered(const bt_case *c, bt_world *w, bt_idx n_field, bt_gid n_floes, bt_errors *err)
+static bool begin_sheltered(const bt_case *c, bt_world *w, const bt_roster *r, bt_errors *err)
 {
     enum { ROUNDS = 2 };
     bool found = true;
     bt_exposure_setup(w, bt_case_reference_speed(c));
     for (int k = 0; k < ROUNDS && w->par.lee > 0 && w->par.exposure_steps > 0 && found; k++) {
         bt_exposure_look(w);
-        const bt_exposure mean = bt_exposure_mean(w, n_floes);
-        for (bt_gid g = 0; g < n_floes; g++) w->bodies.exposure[bt_world_index(w, g)] = mean;
-        found = begin_drift(c, w, n_field, err);
+        const bt_gid n = r->n_floes + r->n_kept;
+        const bt_exposure mean = bt_exposure_mean(w, n);
+        for (bt_idx i = 0; i < w->bodies.n; i++)
+            if (w->bodies.gid[i] < n) w->bodies.exposure[i] = mean;
+        found = begin_drift(c, w, r, err);
     }
     return found;
 }
@@ -299,11 +301,12 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double conc
     if (c->ice.start != BT_START_DRIFT) return;
     bt_world *w = one_floe(c, size, thickness, concentration);
     double thicknesses[2];
+    bt_roster alone = {.n_floes = 1, .n_free = 1, .thickness = thicknesses};
     bt_errors unfound = {0}; // NaN says it
-    if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
-    if (begin_drift(c, w, 1, &unfound)) {
+    if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &alone);
+    if (begin_drift(c, w, &alone, &unfound)) {
         floe[0] = w->bodies.vel[0].x, floe[1] = w->bodies.vel[0].y;
-        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1))
+        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, &alone))
             body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
     }
     bt_errors_free(&unfound);
@@ -330,7 +333,7 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
     bt_world *w = one_floe(&coarse, size, thickness, concentration);
     w->environment = bt_environment_create(&coarse);
     bt_errors unfound = {0};
-    begin_drift(&coarse, w, 1, &unfound); // where it is not found from rest, as undisturbed ice goes on
+    begin_drift(&coarse, w, &(bt_roster){.n_floes = 1, .n_free = 1}, &unfound); // where it is not found from rest, as undisturbed ice goes on
     bt_errors_free(&unfound);
     bool held[2];
     held_ice(c, concentration, held);
@@ -459,13 +462,13 @@ static bool images_apart(const bt_world *w, bt_idx a, bt_idx b, const double fro
 static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
 {
     d[0] = w->bodies.vel[m].x * t, d[1] = w->bodies.vel[m].y * t;
-    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, bt_case_tow_led(c, t), d);
+    if (m == bt_world_towed(w)) bt_setup_tow_displacement(c, w->tow, bt_case_tow_led(c, t), d);
 }
 
 /// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
 static bool meet(const bt_case *c, const bt_world *w, bt_idx i, bt_idx j, bool wall)
 {
-    const bool bent = c->tow.n_waypoints > 0 && (i == w->towed || j == w->towed);
+    const bool bent = c->tow.n_waypoints > 0 && (i == bt_world_towed(w) || j == bt_world_towed(w));
     const int pieces = bent ? 500 : 1;
     const double end = (double)bt_case_steps(c) * c->run.dt;
     double from[2] = {0, 0};
@@ -490,8 +493,8 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
         for (bt_idx j = i + 1; j < b->n; j++) {
             if (b->motion[i] == BT_DYNAMIC) break;
             if (b->motion[j] == BT_DYNAMIC || i >= first_wall) continue;
-            const bool towed = i == w->towed || j == w->towed;
-            if (j == w->towed || j >= first_wall) {
+            const bool towed = i == bt_world_towed(w) || j == bt_world_towed(w);
+            if (j == bt_world_towed(w) || j >= first_wall) {
                 // Walls that stand may hold fixed bodies (piers) and were checked with the tow.
                 if (!meet(c, w, i, j, j >= first_wall)) continue;
                 bt_errors_add(
@@ -499,7 +502,7 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
                     "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
                     "fixed floe, or tow on a line",
                     c->path ? c->path : "case", r->names[j - r->n_floes],
-                    towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");
+                    towed && j != bt_world_towed(w) ? "the towed body" : "a fixed floe of the list floes");
                 sound = false;
             }
         }
@@ -590,22 +593,23 @@ static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
 }
 
 /// What a body is to the user.
-static void name_body(const bt_field *f, const bt_roster *r, bt_gid gid, char out[64])
+static void name_body(const bt_roster *r, bt_gid gid, char out[64])
 {
-    if (gid < f->n) snprintf(out, 64, "floe %lld of the ice", (long long)gid);
-    else if (gid < r->n_floes) snprintf(out, 64, "floes[%lld]", (long long)(gid - f->n));
-    else snprintf(out, 64, "%s", r->names[gid - r->n_floes]);
+    const bt_gid row = bt_roster_row(r, gid);
+    if (row < r->n_free) snprintf(out, 64, "floe %lld of the ice", (long long)row);
+    else if (row < r->n_floes) snprintf(out, 64, "floes[%lld]", (long long)(row - r->n_free));
+    else snprintf(out, 64, "%s", r->names[row - r->n_floes]);
 }
 
 /// Nothing lies in anything else by more than the position projection takes out.
-static bool check_apart(const bt_case *c, const bt_field *f, bt_world *w, const bt_roster *r, bt_errors *err)
+static bool check_apart(const bt_case *c, bt_world *w, const bt_roster *r, bt_errors *err)
 {
     const double allowed = bt_max(w->par.slop, 1e-9 * r->mean_size);
     const bt_overlaps o = bt_world_overlaps(w, allowed);
     if (o.pairs == 0) return true;
     char a[64], b[64];
-    name_body(f, r, o.a < o.b ? o.a : o.b, a);
-    name_body(f, r, o.a < o.b ? o.b : o.a, b);
+    name_body(r, o.a < o.b ? o.a : o.b, a);
+    name_body(r, o.a < o.b ? o.b : o.a, b);
     bt_errors_add(err,
                   "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g "
                   "m), deepest %s and %s; move or "
@@ -635,13 +639,14 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
     r->names = bt_alloc(5, sizeof *r->names);
     add_field(c, f, w, r);
+    bt_bodies_skip(&w->bodies, r->n_kept);
     add_floes_by_hand(c, w, r);
     int n = 0;
     if (with_body) {
         add_towed_body(c, w, r);
         r->names[n++] = "towed body";
     }
-    const bool drifts = begin_drift(c, w, f->n, err);
+    const bool drifts = begin_drift(c, w, r, err);
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
@@ -652,12 +657,12 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
 
     // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls
     // may not be.
-    if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
-    if (!begin_sheltered(c, w, f->n, r->n_floes, err)) return BT_ERR_CASE;
+    if (!check_apart(c, w, r, err)) return BT_ERR_CASE;
+    if (!begin_sheltered(c, w, r, err)) return BT_ERR_CASE;
     bool held[2];
     held_ice(c, f->concentration, held);
     // floes by hand are no ice beside a field
-    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes, held);
+    if (with_body) bt_undisturbed_create(w, f->n > 0 ? f->n : r->n_floes + r->n_kept, held);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes);
     // all have just been looked at: what rests needs no first step to show it

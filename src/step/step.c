@@ -16,6 +16,7 @@
 #include "bergtow/sum.h"
 #include "space/cells.h"
 #include "tow/tow.h"
+#include "step/splitting.h"
 #include "step/window.h"
 #include "bergtow/world.h"
 #include "partition/domain.h"
@@ -255,6 +256,32 @@ static void solve_contacts(bt_world *w)
     st->residual_checks = checks;
 }
 
+/// Free velocities and contacts, again with the pieces of floes that split (step/splitting.h).
+static void solve_split(bt_world *w)
+{
+    bt_step_stats *st = &w->stats, all = {0};
+    for (int round = 0;; round++) {
+        double t0 = bt_clock();
+        bt_forces_begin(w);
+        bt_forces_predict(w); // U*, effective M
+        bt_tow_begin(w);
+        clock_phase(w, &st->phases.forces, &t0);
+        solve_contacts(w); // U2
+        t0 = bt_clock();
+        all.sweeps += st->sweeps;
+        all.contact_updates += st->contact_updates;
+        all.contact_moves += st->contact_moves;
+        all.residual_checks += st->residual_checks;
+        const bool again = bt_splitting_step(w, round);
+        clock_phase(w, &st->phases.split, &t0);
+        if (!again) break;
+    }
+    st->sweeps = all.sweeps;
+    st->contact_updates = all.contact_updates;
+    st->contact_moves = all.contact_moves;
+    st->residual_checks = all.residual_checks;
+}
+
 void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
@@ -270,11 +297,8 @@ void bt_world_step(bt_world *w)
         memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_tow_lead(w);
     bt_exposure_begin(w); // of floes, in some steps
-    bt_forces_begin(w);
-    bt_forces_predict(w); // U*, effective M
-    bt_tow_begin(w);
     clock_phase(w, &st->phases.forces, &t0);
-    solve_contacts(w); // U2
+    solve_split(w); // U2
     t0 = bt_clock();
     bt_laws_grow(w);
     bt_solver_project(w); // D

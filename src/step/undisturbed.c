@@ -32,7 +32,7 @@ static void mean_floe(const bt_world *w, bt_undisturbed *v, bt_gid n_floes)
     double n = 0;
     for (bt_gid g = 0; g < n_floes; g++) {
         const bt_idx i = bt_world_index(w, g);
-        if (b->motion[i] != BT_DYNAMIC) continue;
+        if (i < 0 || b->motion[i] != BT_DYNAMIC) continue;
         const double perimeter = hull_perimeter(b, i);
         v->mass += b->mass[i];
         v->share += b->share[i] * b->mass[i];

@@ -13,6 +13,7 @@
 #include "solve/solver.h"
 #include "space/cells.h"
 #include "space/shore.h"
+#include "step/splitting.h"
 #include "step/window.h"
 #include "tow/tow.h"
 
@@ -39,6 +40,7 @@ void bt_world_free(bt_world *w)
     bt_shore_free(w->shore);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
+    bt_splitting_free(w->splitting);
     bt_tow_free(w->tow);
     bt_events_free(&w->events);
     free(w->window);
@@ -100,6 +102,7 @@ uint64_t bt_world_hash(const bt_world *w)
             sum += hash_memory(&w->cells->cell[k].laws.memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w));
+    if (w->splitting && w->splitting->n > 0) sum = mix(sum ^ bt_splitting_hash(w->splitting));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }
