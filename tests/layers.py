@@ -28,6 +28,7 @@ LAYERS = {
     "partition": "who owns what, migration, exchange",
     "force": "external forces, current and wind",
     "contact": "detection, contact laws",
+    "split": "when and how a floe splits",
     "solve": "sweeps, rounds, projection",
     "loads": "impacts, panels",
     "step": "one step; the world",

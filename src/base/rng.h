@@ -21,6 +21,7 @@ typedef enum {
     BT_RNG_THICKNESS,
     BT_RNG_MEMBER,     ///< seeds of the members of a study
     BT_RNG_HYPERCUBE,  ///< strata of a Latin hypercube, and places in them
+    BT_RNG_SPLIT,      ///< strength of floes
 } bt_rng_purpose;
 
 typedef struct bt_rng {

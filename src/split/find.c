@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: MIT
+// The section along which a floe splits.
+//
+// Demand of a section, with N and M of section.h, h the thickness and l the length; f_t the thrust of the contacts at a
+// along it, f_i what of f_t the floe's inertia balances (the rest is held behind), w the length they bear on:
+//     near   N/(h l) - 6 M/(h l^2)                    at a; for a section without a load at a it is an end as any other
+//     far    N/(h l) + 6 M/(h l^2) - 0.45 f_i/(h l)   at b; a point load that goes through the depth of a beam relieves the
+//            far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4 times l, by finite elements
+//     burst  (0.637 (1 - W^1.5)(f_t - f_i) + 0.43 (1 - W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
+//            tension across the line of a force: 2/pi is that of a disc between two points; both by finite elements
+// Each is held against the strength of its own place; they peak at different places, so that the largest of the ratios
+// counts, not their sum.
+//
+// Sections that are looked at: from each of the largest contacts along its force, through the centroid, and to each
+// other of them; through the centroid across the most tensile axis of sum sym(x f); and across the long axis of the
+// floe at its centroid and at a third and two thirds of its length: a strip that is struck at its end breaks at a third.
+// A corner of which less than the least width would break off is not looked at: no section is shorter than that. A
+// convex floe in two pieces, each nowhere narrower than that, has no shorter one: one of them has no chord parallel to
+// the section longer than it, and the width of a convex body is at most its longest chord of any direction.
+//
+// Quick reject. With G = sum |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
+// D = 2 R, and loads on the outline:
+//     |N| <= G + |T| sqrt(A/J)/2 + P:   a load pulls at the section by at most itself, less its share of the inertia;
+//         |S1| = |S2|, so each is at most half of int r dA <= sqrt(A J).
+//     |M| <= D G + |T| (1 + R sqrt(A/J))/2 + P l/2:   M is that of either part, so at most the mean of both: of loads
+//         and F, D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
+// A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and l < 2 r,
+// the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines from its
+// ends through those of the section meet beyond it: the part lies in their triangle, no wider than d = D l/(2 r - l).
+//     |M| <= d (2 G + |T| R A/J) + P l/2
+// Both bounds over l and l^2 fall with l, and the second is above the first from l = r on; so a bound at the least length
+// is one for all.
+#include "split/find.h"
+#include "base/elementary.h"
+
+#include "bergtow/outline.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double BURST_HELD = 0.637, BURST_FREE = 0.43, FAR_RELIEF = 0.45;
+static const double EQUAL = 1e-9;    // ratios that differ by less are equal
+static const double COMPACT = 0.1;   // second moments along both axes that differ by less of their sum: no long axis
+
+/// Numbers of a floe's outline that do not depend on loads.
+typedef struct form {
+    double area, polar, radius, inradius;
+    double xx, xy, yy;               ///< second moments, m4
+} form;
+
+static form form_of(const bt_split_floe *f)
+{
+    form o = {.inradius = f->convex ? INFINITY : 0};
+    double r2 = 0;
+    for (int i = 0; i < f->n; i++) {
+        const double *p = f->outline + 2 * i, *q = f->outline + 2 * (i + 1 < f->n ? i + 1 : 0);
+        const double c = p[0] * q[1] - p[1] * q[0];
+        o.area += c / 2;
+        o.xx += c * (p[0] * p[0] + p[0] * q[0] + q[0] * q[0]) / 12;
+        o.yy += c * (p[1] * p[1] + p[1] * q[1] + q[1] * q[1]) / 12;
+        o.xy += c * (2 * (p[0] * p[1] + q[0] * q[1]) + p[0] * q[1] + q[0] * p[1]) / 24;
+        r2 = bt_max(r2, p[0] * p[0] + p[1] * p[1]);
+        if (f->convex) o.inradius = bt_min(o.inradius, c / bt_hypot(q[0] - p[0], q[1] - p[1]));
+    }
+    o.radius = sqrt(r2);
+    o.polar = o.xx + o.yy;
+    o.inradius = bt_max(0, o.inradius);
+    return o;
+}
+
+static double bound(const bt_split_floe *f, const form *o, double size, double torque, double opening,
+                    const bt_split_law *law, double l)
+{
+    const double d = 2 * o->radius, ratio = o->area / o->polar, g = o->radius * sqrt(ratio);
+    const double normal = size + torque * sqrt(ratio) / 2 + opening;
+    double moment = d * size + torque * (1 + g) / 2;
+    if (l < o->inradius) {
+        const double cap = d * l / (2 * o->inradius - l) + 2 * law->slop;
+        moment = bt_min(moment, cap * (2 * size + torque * o->radius * ratio));
+    }
+    moment += opening * l / 2;
+    const double bending = (normal + 6 * moment / l) / (f->thickness * l) / bt_split_strength(law, l, true);
+    const double far = bt_split_strength(law, d, false), short_far = bt_split_strength(law, l, false);
+    const double burst = BURST_HELD * size / f->thickness * bt_max(d / (o->area * far), 1 / (l * short_far));
+    return bt_max(bending, burst) / f->factor;
+}
+
+double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l)
+{
+    const form o = form_of(f);
+    return bound(f, &o, loads->size, fabs(loads->torque), loads->opening, law, l);
+}
+
+/// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
+static double width_of(int n, const double *v, double *aspect)
+{
+    double width = INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0);
+        const double l = bt_hypot(q[0] - p[0], q[1] - p[1]);
+        if (!(l > 0)) continue;
+        const double ex = (q[0] - p[0]) / l, ey = (q[1] - p[1]) / l;
+        double across = 0, low = 0, high = l;
+        for (int k = 0; k < n; k++) {
+            const double x = v[2 * k] - p[0], y = v[2 * k + 1] - p[1], along = x * ex + y * ey;
+            across = bt_max(across, ex * y - ey * x);
+            low = bt_min(low, along), high = bt_max(high, along);
+        }
+        if (across < width) width = across, *aspect = (high - low) / across;
+    }
+    return width;
+}
+
+static double hull_width(int n, const double *v, bool convex, double *aspect)
+{
+    if (convex) return width_of(n, v, aspect);
+    double hull[2 * (BT_MAX_VERTICES + 2)];
+    memcpy(hull, v, 2 * (size_t)n * sizeof *hull);
+    return width_of(bt_shape_hull(n, hull), hull, aspect);
+}
+
+static bool has_parts(int n, const double *v)
+{
+    bt_parts parts;
+    return bt_outline_convex(n, v) || (!bt_outline_fault(n, v) && bt_outline_split(n, v, &parts));
+}
+
+static bt_split_refusal refusal_of(const bt_split_floe *f, const bt_chord *c, const bt_split_law *law)
+{
+    double whole = 0;
+    hull_width(f->n, f->outline, f->convex, &whole);
+    const double most = bt_max(law->aspect, whole * (1 - EQUAL));
+    for (int side = 0; side < 2; side++) {
+        const bt_chord along = side ? (bt_chord){c->b, c->a} : *c;
+        double piece[2 * (BT_MAX_VERTICES + 2)], aspect = 0;
+        const int n = bt_chord_piece(f->n, f->outline, &along, piece);
+        if (n < 3 || !(hull_width(n, piece, f->convex, &aspect) >= law->least_width)) return BT_SPLIT_SIZE;
+        if (aspect > most) return BT_SPLIT_ASPECT;
+        if (n > BT_MAX_VERTICES || (!f->convex && !has_parts(n, piece))) return BT_SPLIT_OUTLINE;
+    }
+    return BT_SPLIT_ALLOWED;
+}
+
+/// A search through the sections of one floe under loads that act at the same time.
+typedef struct search {
+    const bt_split_floe *floe;
+    const form *form;
+    const bt_load_case *loads;
+    const bt_split_law *law;
+    bt_split *best;
+} search;
+
+/// Largest stress / strength of a section, and where. A section without a load at a is turned so that bending opens b.
+static double demand(const search *s, bt_chord *c, double length, bt_split_mode *mode)
+{
+    bt_section q = bt_section_of(s->floe, s->form->area, s->form->polar, s->loads, c, s->law->slop);
+    if (!q.loaded && q.moment < 0) {
+        *c = (bt_chord){c->b, c->a};
+        q = bt_section_of(s->floe, s->form->area, s->form->polar, s->loads, c, s->law->slop);
+    }
+    const double hl = s->floe->thickness * length, bending = 6 * q.moment / length;
+    const double near = (q.normal - bending) / hl, far = (q.normal + bending - FAR_RELIEF * q.inertial) / hl;
+    const double b = bt_min(q.width, length), share = bt_min(1, q.bearing / b);
+    const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (q.thrust - q.inertial) +
+                          BURST_FREE * (1 - share) * q.inertial) /
+                         (s->floe->thickness * b);
+    const double strength = s->floe->factor * bt_split_strength(s->law, length, false);
+    const double at_load = s->floe->factor * bt_split_strength(s->law, length, true);
+    double ratio = far / strength;
+    *mode = BT_SPLIT_FAR;
+    if (q.loaded && near / at_load > ratio) ratio = near / at_load, *mode = BT_SPLIT_NEAR;
+    if (burst / strength > ratio) ratio = burst / strength, *mode = BT_SPLIT_BURST;
+    return ratio;
+}
+
+static void consider(const search *s, bt_chord c)
+{
+    double a[2], b[2];
+    bt_chord_place(s->floe->n, s->floe->outline, c.a, a);
+    bt_chord_place(s->floe->n, s->floe->outline, c.b, b);
+    const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
+    const bt_load_case *w = s->loads;
+    if (!(l >= s->law->least_width) || !(l > s->law->slop)) return;
+    if (!(bound(s->floe, s->form, w->size, fabs(w->torque), w->opening, s->law, l) > 1)) return;
+    bt_split_mode mode;
+    const double ratio = demand(s, &c, l, &mode);
+    bt_split *best = s->best;
+    if (!(ratio > 1) || !(ratio > best->ratio * (1 + EQUAL))) return;
+    const bt_split_refusal refused = refusal_of(s->floe, &c, s->law);
+    if (refused) {
+        if (ratio > best->refused_ratio) best->refused_ratio = ratio, best->refused = refused;
+        return;
+    }
+    best->chord = c;
+    best->mode = mode;
+    best->ratio = ratio;
+    best->length = l;
+    best->peak = w->peak;
+}
+
+static void consider_from(const search *s, bt_chord_end from, double dx, double dy)
+{
+    bt_chord c;
+    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &c)) consider(s, c);
+}
+
+static void consider_through(const search *s, double x, double y, double dx, double dy)
+{
+    bt_chord c;
+    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c);
+}
+
+/// Unit vector of the larger eigenvalue of a symmetric 2 x 2 matrix; false when both are equal to a part `tiny` of scale.
+static bool major_axis(double xx, double xy, double yy, double tiny, double *x, double *y)
+{
+    const double half = (xx - yy) / 2, r = bt_hypot(half, xy);
+    if (!(r > tiny)) return false;
+    *x = sqrt(bt_max(0, (1 + half / r) / 2));
+    *y = sqrt(bt_max(0, (1 - half / r) / 2));
+    if (xy < 0) *y = -*y;
+    return true;
+}
+
+static void search_sections(const search *s)
+{
+    const bt_load_case *w = s->loads;
+    const bt_split_floe *f = s->floe;
+    // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two are equal.
+    int chosen[BT_SPLIT_CONTACTS], n = 0;
+    for (int k = 0; k < w->n; k++) {
+        if (!bt_load_acts(w, k)) continue;
+        const bt_floe_load *a = w->load[k].load;
+        const double size = a->fx * a->fx + a->fy * a->fy;
+        if (!(size > 0)) continue;
+        if (n < BT_SPLIT_CONTACTS) {
+            chosen[n++] = k;
+            continue;
+        }
+        int least = -1;
+        double least_size = size;
+        for (int i = 0; i < n; i++) {
+            const bt_floe_load *b = w->load[chosen[i]].load;
+            const double other = b->fx * b->fx + b->fy * b->fy;
+            if (other < least_size) least_size = other, least = i;
+        }
+        if (least < 0) continue;
+        memmove(chosen + least, chosen + least + 1, (size_t)(n - 1 - least) * sizeof *chosen);
+        chosen[n - 1] = k;
+    }
+    double xx = 0, xy = 0, yy = 0, scale = 0;
+    for (int i = 0; i < n; i++) {
+        const bt_edge_load *e = &w->load[chosen[i]];
+        consider_from(s, e->place, e->load->fx, e->load->fy);
+        consider_from(s, e->place, -e->x, -e->y);
+        for (int j = 0; j < n; j++) {
+            const bt_edge_load *other = &w->load[chosen[j]];
+            if (j != i) consider_from(s, e->place, other->x - e->x, other->y - e->y);
+        }
+        xx += e->x * e->load->fx, yy += e->y * e->load->fy;
+        xy += (e->x * e->load->fy + e->y * e->load->fx) / 2;
+        scale += s->form->radius * (fabs(e->load->fx) + fabs(e->load->fy));
+    }
+    double x, y;
+    if (major_axis(xx, xy, yy, EQUAL * scale, &x, &y)) consider_through(s, 0, 0, -y, x);
+    const form *o = s->form;
+    if (!major_axis(o->xx, o->xy, o->yy, COMPACT * o->polar / 2, &x, &y)) return;
+    if (x * f->outline[0] + y * f->outline[1] < 0) x = -x, y = -y;
+    double low = 0, high = 0;
+    for (int i = 0; i < f->n; i++) {
+        const double along = x * f->outline[2 * i] + y * f->outline[2 * i + 1];
+        low = bt_min(low, along), high = bt_max(high, along);
+    }
+    consider_through(s, 0, 0, -y, x);
+    for (int k = 1; k <= 2; k++) {
+        const double at = low + k * (high - low) / 3;
+        consider_through(s, at * x, at * y, -y, x);
+    }
+}
+
+static int by_contact(const void *a, const void *b)
+{
+    const bt_floe_load *p = a, *q = b;
+    if (p->other != q->other) return p->other < q->other ? -1 : 1;
+    if (p->part != q->part) return p->part < q->part ? -1 : 1;
+    if (p->point != q->point) return p->point < q->point ? -1 : 1;
+    return (int)p->collision - (int)q->collision;
+}
+
+bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best)
+{
+    *best = (bt_split){.peak = -1};
+    double size = 0, peak = 0, opening = 0;
+    for (int k = 0; k < n_loads; k++) {
+        const double force = bt_hypot(load[k].fx, load[k].fy);
+        if (load[k].collision) peak = bt_max(peak, force);
+        else size += force;
+        opening += load[k].opening;
+    }
+    size += peak;
+    if (!(size + opening > 0)) return false;
+    const form o = form_of(f);
+    if (!(2 * o.radius >= law->least_width)) return false;
+    if (!(bound(f, &o, size, size * o.radius, opening, law, law->least_width) > 1)) return false;
+
+    qsort(load, (size_t)n_loads, sizeof *load, by_contact);
+    bt_edge_load few[16], *on_edge = n_loads <= 16 ? few : bt_alloc((size_t)n_loads, sizeof *on_edge);
+    for (int k = 0; k < n_loads; k++) on_edge[k] = bt_edge_load_of(f, &load[k], law->slop);
+    for (int k = -1; k < n_loads; k++) {
+        if (k >= 0 && !load[k].collision) continue;
+        const bt_load_case w = bt_load_case_of(on_edge, n_loads, k);
+        if (!(bound(f, &o, w.size, fabs(w.torque), w.opening, law, law->least_width) > 1)) continue;
+        search_sections(&(search){f, &o, &w, law, best});
+    }
+    if (on_edge != few) free(on_edge);
+    return best->ratio > 0;
+}

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+// Chords of an outline, and what they have to carry (section.h).
+#include "split/section.h"
+#include "base/elementary.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
+
+void bt_chord_place(int n, const double *v, bt_chord_end e, double p[2])
+{
+    const double *a = v + 2 * e.edge, *b = v + 2 * (e.edge + 1 < n ? e.edge + 1 : 0);
+    p[0] = a[0] + e.t * (b[0] - a[0]);
+    p[1] = a[1] + e.t * (b[1] - a[1]);
+}
+
+/// The place at share t, 0 to 1, of an edge, or a vertex within slop of it.
+static bt_chord_end place_on(int n, const double *v, int edge, double t, double slop)
+{
+    const int next = edge + 1 < n ? edge + 1 : 0;
+    const double l = bt_hypot(v[2 * next] - v[2 * edge], v[2 * next + 1] - v[2 * edge + 1]);
+    if (t * l <= slop) return (bt_chord_end){edge, 0};
+    if ((1 - t) * l <= slop || !(t < 1)) return (bt_chord_end){next, 0};
+    return (bt_chord_end){edge, t};
+}
+
+bt_chord_end bt_chord_nearest(int n, const double *v, double x, double y, double slop)
+{
+    int edge = 0;
+    double share = 0, least = INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *a = v + 2 * i, *b = v + 2 * (i + 1 < n ? i + 1 : 0);
+        const double ex = b[0] - a[0], ey = b[1] - a[1], l2 = ex * ex + ey * ey;
+        const double t = l2 > 0 ? bt_min(1, bt_max(0, ((x - a[0]) * ex + (y - a[1]) * ey) / l2)) : 0;
+        const double dx = x - a[0] - t * ex, dy = y - a[1] - t * ey, d2 = dx * dx + dy * dy;
+        if (d2 < least) least = d2, edge = i, share = t;
+    }
+    return place_on(n, v, edge, share, slop);
+}
+
+typedef struct crossing {
+    int edge;
+    double t, along; ///< share of the edge; coordinate on the line, m
+} crossing;
+
+/// Where the line through (x, y) along the unit vector (dx, dy) crosses the outline, in order along it. A vertex is on
+/// one side or the other, the same for both its edges: there is always an even number, and what lies between the first
+/// and the second, the third and the fourth, ... is inside.
+static int crossings(int n, const double *v, double x, double y, double dx, double dy, crossing *out)
+{
+    int k = 0;
+    double s = cross(dx, dy, v[2 * (n - 1)] - x, v[2 * (n - 1) + 1] - y);
+    for (int j = 0; j < n; j++) {
+        const int i = j > 0 ? j - 1 : n - 1;
+        const double s_next = cross(dx, dy, v[2 * j] - x, v[2 * j + 1] - y);
+        if ((s > 0) != (s_next > 0)) {
+            const double t = s / (s - s_next), *a = v + 2 * i, *b = v + 2 * j;
+            const double px = a[0] + t * (b[0] - a[0]) - x, py = a[1] + t * (b[1] - a[1]) - y;
+            const crossing c = {i, t, px * dx + py * dy};
+            int at = k++;
+            for (; at > 0 && out[at - 1].along > c.along; at--) out[at] = out[at - 1];
+            out[at] = c;
+        }
+        s = s_next;
+    }
+    return k;
+}
+
+static bool unit(double *dx, double *dy)
+{
+    const double l = bt_hypot(*dx, *dy);
+    if (!(l > 0)) return false;
+    *dx /= l, *dy /= l;
+    return true;
+}
+
+bool bt_chord_from(int n, const double *v, bt_chord_end a, double dx, double dy, double slop, bt_chord *c)
+{
+    crossing at[BT_MAX_VERTICES];
+    double p[2];
+    bt_chord_place(n, v, a, p);
+    if (!unit(&dx, &dy)) return false;
+    const int k = crossings(n, v, p[0], p[1], dx, dy, at);
+    int first = 0;
+    while (first < k && at[first].along <= slop) first++;
+    if ((k - first) % 2 == 0) return false; // just beyond the place is outside
+    *c = (bt_chord){a, place_on(n, v, at[first].edge, at[first].t, slop)};
+    return true;
+}
+
+bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *c)
+{
+    crossing at[BT_MAX_VERTICES];
+    if (!unit(&dx, &dy)) return false;
+    const int k = crossings(n, v, x, y, dx, dy, at);
+    int best = -1;
+    double least = INFINITY;
+    for (int i = 0; i + 1 < k; i += 2) {
+        const double away = bt_max(0, bt_max(at[i].along, -at[i + 1].along));
+        if (away < least) least = away, best = i;
+    }
+    if (best < 0) return false;
+    *c = (bt_chord){place_on(n, v, at[best].edge, at[best].t, slop),
+                    place_on(n, v, at[best + 1].edge, at[best + 1].t, slop)};
+    return true;
+}
+
+int bt_chord_piece(int n, const double *v, const bt_chord *c, double *out)
+{
+    const bt_chord_end a = c->a, b = c->b;
+    if (a.edge == b.edge && a.t == b.t) return 0;
+    bt_chord_place(n, v, a, out);
+    bt_chord_place(n, v, b, out + 2);
+    // vertices after b up to that of a's edge, which is a itself when a is a vertex
+    int between = a.edge - b.edge;
+    if (between < 0 || (between == 0 && b.t > a.t)) between += n;
+    if (a.t == 0 && between > 0) between--;
+    for (int i = 0; i < between; i++) memcpy(out + 2 * (i + 2), v + 2 * ((b.edge + 1 + i) % n), 2 * sizeof *out);
+    return between + 2;
+}
+
+bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, double slop)
+{
+    bt_edge_load e = {.load = load, .place = bt_chord_nearest(f->n, f->outline, load->x, load->y, slop), .parts = 1};
+    double p[2];
+    bt_chord_place(f->n, f->outline, e.place, p);
+    e.x = p[0], e.y = p[1];
+    e.part[0].x = p[0], e.part[0].y = p[1], e.part[0].position = e.place.edge + e.place.t;
+    if (!(load->length / 4 > slop)) return e;
+    e.parts = 2;
+    for (int i = 0; i < 2; i++) {
+        const double off = (i ? 0.25 : -0.25) * load->length;
+        const bt_chord_end at =
+            bt_chord_nearest(f->n, f->outline, e.x + off * load->edge_x, e.y + off * load->edge_y, 0);
+        bt_chord_place(f->n, f->outline, at, p);
+        e.part[i].x = p[0], e.part[i].y = p[1], e.part[i].position = at.edge + at.t;
+    }
+    return e;
+}
+
+bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak)
+{
+    bt_load_case c = {.load = load, .n = n, .peak = peak};
+    for (int k = 0; k < n; k++) {
+        if (!bt_load_acts(&c, k)) continue;
+        const bt_floe_load *f = load[k].load;
+        c.fx += f->fx, c.fy += f->fy;
+        c.size += bt_hypot(f->fx, f->fy);
+        c.opening += f->opening;
+        for (int i = 0; i < load[k].parts; i++)
+            c.torque += cross(load[k].part[i].x, load[k].part[i].y, f->fx, f->fy) / load[k].parts;
+    }
+    return c;
+}
+
+/// Area, first moments and polar second moment of a polygon about the origin.
+static void moments_about_origin(int n, const double *v, double *area, double *sx, double *sy, double *polar)
+{
+    *area = *sx = *sy = *polar = 0;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0), c = cross(p[0], p[1], q[0], q[1]);
+        *area += c / 2;
+        *sx += c * (p[0] + q[0]) / 6;
+        *sy += c * (p[1] + q[1]) / 6;
+        *polar += c * (p[0] * p[0] + p[1] * p[1] + p[0] * q[0] + p[1] * q[1] + q[0] * q[0] + q[1] * q[1]) / 12;
+    }
+}
+
+bt_section bt_section_of(const bt_split_floe *f, double area, double polar, const bt_load_case *loads,
+                         const bt_chord *c, double slop)
+{
+    double a[2], b[2], piece[2 * (BT_MAX_VERTICES + 2)];
+    bt_chord_place(f->n, f->outline, c->a, a);
+    bt_chord_place(f->n, f->outline, c->b, b);
+    bt_section s = {.length = bt_hypot(b[0] - a[0], b[1] - a[1])};
+    const double l = s.length, dx = (b[0] - a[0]) / l, dy = (b[1] - a[1]) / l, nx = -dy, ny = dx;
+    const double mx = (a[0] + b[0]) / 2, my = (a[1] + b[1]) / 2;
+    double area1, sx, sy, polar1;
+    moments_about_origin(bt_chord_piece(f->n, f->outline, c, piece), piece, &area1, &sx, &sy, &polar1);
+    const double turn = loads->torque / polar;
+    double qx = -loads->fx * area1 / area + turn * sy, qy = -loads->fy * area1 / area - turn * sx;
+    double moment = -cross(sx, sy, loads->fx, loads->fy) / area - turn * polar1 - cross(mx, my, qx, qy);
+
+    const double at_a = c->a.edge + c->a.t, at_b = c->b.edge + c->b.t, n = f->n;
+    const double left = at_a >= at_b ? at_a - at_b : at_a - at_b + n;
+    double opened = 0, opened_far = 0;
+    for (int k = 0; k < loads->n; k++) {
+        if (!bt_load_acts(loads, k)) continue;
+        const bt_edge_load *e = &loads->load[k];
+        const bt_floe_load *force = e->load;
+        for (int i = 0; i < e->parts; i++) {
+            const double x = e->part[i].x, y = e->part[i].y, position = e->part[i].position;
+            const double from_b = position >= at_b ? position - at_b : position - at_b + n;
+            const bool at_end = bt_hypot(x - a[0], y - a[1]) <= slop || bt_hypot(x - b[0], y - b[1]) <= slop;
+            const double share = (at_end ? 0.5 : from_b < left ? 1 : 0) / e->parts;
+            qx += share * force->fx, qy += share * force->fy;
+            moment += share * cross(x - mx, y - my, force->fx, force->fy);
+        }
+        const double reach = slop + force->length / 2;
+        const double pair = force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
+        if (bt_hypot(e->x - a[0], e->y - a[1]) <= reach) {
+            s.loaded = true;
+            s.thrust += force->fx * dx + force->fy * dy;
+            s.bearing += force->length;
+            opened += pair;
+        } else if (bt_hypot(e->x - b[0], e->y - b[1]) <= reach) {
+            opened_far += pair;
+        }
+    }
+    s.thrust = bt_max(0, s.thrust);
+    s.inertial = bt_min(s.thrust, bt_max(0, loads->fx * dx + loads->fy * dy));
+    s.width = area / l;
+    s.normal = qx * nx + qy * ny + opened + opened_far;
+    s.moment = moment + (opened_far - opened) * l / 2;
+    return s;
+}
