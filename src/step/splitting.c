@@ -326,7 +326,7 @@ static bool add_found(const bt_world *w, const judged *j, found_list *to)
     const int n = bt_body_corners(b, i);
     const double *outline = b->vertices + 2 * b->offset[i];
     bt_piece piece[2];
-    if (!bt_cut(n, outline, b->area[i], polar_of(w, i), &j->best.chord, piece)) return false;
+    if (!bt_split_cut(n, outline, b->area[i], polar_of(w, i), &j->best.chord, piece)) return false;
     found_row r = {.record = {.step = w->step, .parent = b->gid[i],
                               .generation = bt_splitting_generation(w->splitting, b->gid[i]) + 1,
                               .mode = j->best.mode, .thickness = b->thickness[i], .ratio = j->best.ratio},
