@@ -16,6 +16,7 @@
 #include "loads/impact.h"
 #include "space/cells.h"
 #include "tow/tow.h"
+#include "step/splitting.h"
 #include "step/window.h"
 #include "partition/domain.h"
 #include "output/state_check.h"
@@ -134,6 +135,44 @@ static const bt_state_row undisturbed_rows[] = {
     UNDISTURBED(1, drift_y, "m", "one", FINITE, "way of the undisturbed ice, y"),
     UNDISTURBED(4, vel, "m/s, m/s, rad/s, 1", "one motion", FINITE,
         "velocity of the undisturbed ice, x, y, turning; the last is unused"),
+};
+
+#define SPLIT_TOTAL(type, member, units, check, meaning) \
+    ONE(bt_split_totals, #member, type, member, units, check, meaning)
+#define SPLIT_MODE(label, mode, meaning) \
+    ONE(bt_split_totals, label, I64, by_mode[mode], "1", COUNT, meaning)
+static const bt_state_row split_total_rows[] = {
+    SPLIT_MODE("near", BT_SPLIT_NEAR, "floes opened at a load"),
+    SPLIT_MODE("far", BT_SPLIT_FAR, "floes bent"),
+    SPLIT_MODE("burst", BT_SPLIT_BURST, "floes that burst"),
+    SPLIT_TOTAL(I64, deferred, "1", COUNT, "floes that waited for the next step, in all steps"),
+    SPLIT_TOTAL(I64, too_small, "1", COUNT, "floes whose pieces would have been too small, in all steps"),
+    SPLIT_TOTAL(I64, too_old, "1", COUNT, "floes of the last generation that would have split, in all steps"),
+    SPLIT_TOTAL(I64, no_id, "1", COUNT, "floes for whose pieces no ids were left, in all steps"),
+    SPLIT_TOTAL(I64, rafted, "1", COUNT, "floes over or under others that would have split, in all steps"),
+    SPLIT_TOTAL(I64, unconverged, "1", COUNT, "steps that did not converge, and so split nothing"),
+    SPLIT_TOTAL(I64, steps, "1", COUNT, "steps with a split"),
+    SPLIT_TOTAL(F64, crack_length, "m", NOT_NEGATIVE, "length of all cracks"),
+    SPLIT_TOTAL(F64, work, "J", NOT_NEGATIVE, "work of fracture"),
+    SPLIT_TOTAL(F64, largest_refused, "1", NOT_NEGATIVE, "largest stress over strength of a floe that could not split"),
+};
+
+#define SPLIT(type, width, member, units, axes, check, meaning) \
+    MEMBER(bt_split_record, #member, type, width, member, units, axes, check, meaning)
+static const bt_state_row split_columns[] = {
+    SPLIT(I64, 1, step, "1", "split", COUNT, "steps done before the one in which each floe split"),
+    SPLIT(I64, 1, parent, "1", "split", COUNT, "id of the floe"),
+    SPLIT(I64, 1, generation, "1", "split", COUNT, "of the pieces"),
+    SPLIT(I64, 1, mode, "1", "split", COUNT, "1 = opened at a load, 2 = bent, 3 = burst"),
+    SPLIT(F64, 2, near, "m", "split xy", FINITE, "end of the crack at the load"),
+    SPLIT(F64, 2, far, "m", "split xy", FINITE, "its other end"),
+    SPLIT(F64, 1, thickness, "m", "split", NOT_NEGATIVE, "thickness of the floe"),
+    SPLIT(F64, 1, ratio, "1", "split", NOT_NEGATIVE, "stress over strength"),
+    SPLIT(F64, 2, area, "m2", "split piece", NOT_NEGATIVE, "areas of the pieces"),
+    SPLIT(F64, 2, polar, "m4", "split piece", NOT_NEGATIVE, "second moments of area of the pieces, polar"),
+    SPLIT(F64, 4, at, "m", "split piece_xy", FINITE, "centroids of the pieces in the frame of the floe"),
+    SPLIT(I64, 3, corners, "1", "split outline", COUNT,
+        "vertices of the outlines of the pieces, and of the floe if it was there from the start"),
 };
 
 enum {
@@ -333,12 +372,19 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
     const bt_bodies *b = &w->bodies;
     const int64_t count = c->rank == 0 ? b->n_global : 0;
     bt_idx n = 0;
-    bt_gid *gid = bt_alloc((size_t)b->n, sizeof *gid);
-    bt_idx *body = bt_alloc((size_t)b->n, sizeof *body);
+    // every id has a row, also those of floes that have split and of pieces yet to come: zeros, from rank 0
+    const size_t most = (size_t)(w->splitting ? b->n_global : b->n);
+    bt_gid *gid = bt_alloc(most, sizeof *gid);
+    bt_idx *body = bt_alloc(most, sizeof *body);
     for (bt_idx i = 0; i < b->n; i++) {
         if (!bt_domain_owns(w, i)) continue;
         gid[n] = b->gid[i];
         body[n++] = i;
+    }
+    for (bt_gid g = 0; g < b->n_global && w->splitting && c->rank == 0; g++) {
+        if (!b->gone[g]) continue;
+        gid[n] = g;
+        body[n++] = -1;
     }
     int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
     for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
@@ -348,7 +394,7 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
         const size_t bytes = bt_item_size(in_row.type) * (size_t)in_row.width, width = (bytes + 7) / 8;
         double *mine = bt_alloc((size_t)n, width * sizeof *mine), *all = bt_alloc((size_t)count, width * sizeof *all);
         for (bt_idx i = 0; i < n; i++) {
-            const body_row row = row_of(b, body[i]);
+            const body_row row = body[i] < 0 ? (body_row){0} : row_of(b, body[i]);
             memcpy(mine + (size_t)i * width, (const char *)&row + in_row.offset, bytes);
         }
         status = bt_comm_rows_by_gid(c, first, n, gid, (int)width, mine, all, err);
@@ -367,10 +413,37 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
 static void load_bodies(bt_world *w, bt_snapshot *s)
 {
     int64_t n = w->bodies.n_global;
-    assert(w->bodies.n == n); // nothing is distributed yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
-    for (bt_gid g = 0; g < n && !s->faulty; g++) put_row(w, bt_world_index(w, g), &rows[g]);
+    for (bt_gid g = 0; g < n && !s->faulty; g++)
+        if (!w->bodies.gone[g]) put_row(w, bt_world_index(w, g), &rows[g]);
     free(rows);
+}
+
+// --- floes that split ------------------------------------------------------------------------------------------------
+
+static void save_splitting(const bt_splitting *p, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "splitting", split_total_rows, N_OF(split_total_rows), &p->total);
+    save_columns(s, "splits", split_columns, N_OF(split_columns), p->split, sizeof *p->split, p->n);
+    bt_snapshot_add(s, "splits/vertices", BT_ITEM_F64, p->n_vertices, 2, p->vertex);
+}
+
+/// The history, and pieces in the place of the floes that have split.
+static void load_splitting(bt_world *w, bt_snapshot *s)
+{
+    bt_splitting *p = w->splitting;
+    int64_t n = -1, n_vertices = 0, at = 0;
+    bt_snapshot_take_rows(s, "splitting", split_total_rows, N_OF(split_total_rows), &p->total);
+    bt_split_record *rows = load_columns(s, "splits", split_columns, N_OF(split_columns), sizeof *rows, &n);
+    double *vertex = bt_snapshot_copy(s, "splits/vertices", BT_ITEM_F64, 2, &n_vertices);
+    if (!s->faulty) bt_state_check_splits(w, rows, n, vertex, n_vertices, s);
+    for (int64_t k = 0; k < n && !s->faulty; k++) {
+        bt_splitting_append(p, &rows[k], vertex + 2 * at);
+        at += rows[k].corners[0] + rows[k].corners[1] + rows[k].corners[2];
+    }
+    free(rows);
+    free(vertex);
+    if (!s->faulty) bt_splitting_restore(w);
 }
 
 // --- contacts --------------------------------------------------------------------------------------------------------
@@ -509,6 +582,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->undisturbed)
         bt_snapshot_add_rows(s, "undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
+    if (w->splitting) save_splitting(w->splitting, s);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
     save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event,
                  w->events.n);
@@ -573,6 +647,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     bt_snapshot_take_rows(s, "world", world_rows, N_OF(world_rows), w);
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
+    if (w->splitting && !s->faulty) load_splitting(w, s);
     load_bodies(w, s);
     bt_snapshot_take_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
@@ -623,9 +698,16 @@ static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, co
 {
     enum { FLOES = 1024 }; // at a time
     const bt_bodies *b = &w->bodies;
+    const bt_splitting *p = w->splitting;
+    int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that is gone, 0 = none
     double most = 0;
     for (bt_idx i = 0; i < b->n; i++)
         if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
+    for (int64_t k = 0; p && k < p->n; k++) {
+        if (p->split[k].parent >= n) continue;
+        split[p->split[k].parent] = k + 1;
+        most = bt_max(most, (double)p->split[k].corners[2]);
+    }
     bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
     const size_t width = 2 * (size_t)most, size = width * sizeof(double);
     double *mine = bt_alloc(FLOES, size), *all = bt_alloc(FLOES, size), *packed = bt_alloc(FLOES, size);
@@ -639,9 +721,11 @@ static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, co
         bt_idx own = 0;
         for (bt_gid g = from; g < end; g++) {
             const bt_idx i = bt_world_index(w, g);
-            if (i < 0 || !bt_domain_owns(w, i)) continue;
-            memcpy(mine + (size_t)own * width, b->vertices + 2 * b->offset[i],
-                   2 * sizeof *mine * (size_t)bt_body_corners(b, i));
+            const bool gone = split[g] > 0;
+            if (gone ? c->rank != 0 : i < 0 || !bt_domain_owns(w, i)) continue;
+            const double *v = gone ? bt_splitting_outline(p, split[g] - 1, 2) : b->vertices + 2 * b->offset[i];
+            const int corners = gone ? (int)p->split[split[g] - 1].corners[2] : bt_body_corners(b, i);
+            memcpy(mine + (size_t)own * width, v, 2 * sizeof *mine * (size_t)corners);
             gid[own++] = g;
         }
         first[0] = from;
@@ -658,6 +742,7 @@ static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, co
     free(packed);
     free(gid);
     free(first);
+    free(split);
     return status;
 }
 

@@ -10,6 +10,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/contact.h"
@@ -18,6 +19,7 @@
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 #include "tow/tow.h"
+#include "step/splitting.h"
 #include "step/window.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
@@ -144,7 +146,7 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
     const bt_bodies *b = &w->bodies;
     for (bt_gid g = 0; g < b->n_global && !s->faulty; g++) {
         const bt_idx i = bt_world_index(w, g);
-        if (b->large[i] || s->faulty) continue;
+        if (b->gone[g] || b->large[i] || s->faulty) continue;
         bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/cell", g, "is outside the box of the cells");
         bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/cell", g,
                          "is too far from where the floe is");
@@ -173,6 +175,7 @@ static void check_contacts(const bt_world *w, const bt_memory *memory, int64_t n
         const bt_memory *t = &memory[k];
         bt_snapshot_want(s, t->a >= 0 && t->a < t->b && t->b < b->n_global, "contacts/a", k,
                          "and b are no pair of bodies");
+        if (!s->faulty) bt_snapshot_want(s, !b->gone[t->a] && !b->gone[t->b], "contacts/a", k, "or b is not there");
         if (s->faulty) return;
         const bt_idx i = bt_world_index(w, t->a), j = bt_world_index(w, t->b);
         bt_snapshot_want(s, can_meet(w, i, j), "contacts/a", k, "and b are bodies that cannot touch");
@@ -230,6 +233,51 @@ static void check_events(const bt_world *w, bt_snapshot *s)
         const bt_event *e = &w->events.event[k];
         bt_snapshot_want(s, e->kind >= 0 && e->kind < BT_EVENT_KINDS, "events/kind", k, "is no kind of event");
     }
+}
+
+// --- floes that split ------------------------------------------------------------------------------------------------
+
+/// A floe that splits is there, its pieces have outlines, and they share its area.
+static void check_split(const bt_world *w, const bt_split_record *r, int64_t k, const double *v, uint8_t *there,
+                        bt_snapshot *s)
+{
+    const bt_splitting *p = w->splitting;
+    const bool known = r->parent >= 0 && r->parent < w->bodies.n_global && there[r->parent];
+    bt_snapshot_want(s, known, "splits/parent", k, "is no floe that is there");
+    bt_snapshot_want(s, r->step < w->step && r->mode >= BT_SPLIT_NEAR && r->mode <= BT_SPLIT_BURST, "splits/mode", k,
+                     "is no split of the steps done");
+    if (s->faulty) return;
+    const bool piece = r->parent >= p->first && r->parent < p->first + p->reserve;
+    bt_snapshot_want(s, (r->corners[2] == 0) == piece && (r->generation == 1) == !piece, "splits/generation", k,
+                     "does not fit the floe");
+    for (int i = 0; i < 3 && !s->faulty && r->corners[i] > 0; v += 2 * r->corners[i++])
+        bt_snapshot_want(s, !bt_outline_fault((int)r->corners[i], v), "splits/vertices", k, "are no outline of a floe");
+    there[r->parent] = 0;
+    there[p->first + 2 * k] = there[p->first + 2 * k + 1] = 1;
+}
+
+void bt_state_check_splits(const bt_world *w, const bt_split_record *rows, int64_t n, const double *vertex,
+                           int64_t n_vertices, bt_snapshot *s)
+{
+    const bt_splitting *p = w->splitting;
+    int64_t at = 0;
+    bt_snapshot_want(s, 2 * n <= p->reserve, "splits/parent", -1, "has more rows than ids are kept for");
+    for (int64_t k = 0; k < n && !s->faulty; k++) {
+        const int64_t *c = rows[k].corners;
+        for (int i = 0; i < 3; i++)
+            bt_snapshot_want(s, (c[i] >= 3 || (i == 2 && c[i] == 0)) && c[i] <= BT_MAX_VERTICES, "splits/corners", k,
+                             "is no number of vertices");
+        at += s->faulty ? 0 : c[0] + c[1] + c[2];
+        bt_snapshot_want(s, at <= n_vertices, "splits/corners", k, "are more vertices than there are");
+    }
+    bt_snapshot_want(s, at == n_vertices, "splits/vertices", -1, "are more than the outlines have");
+    uint8_t *there = bt_alloc((size_t)w->bodies.n_global, 1);
+    for (bt_gid g = 0; g < w->bodies.n_global; g++) there[g] = !w->bodies.gone[g];
+    for (int64_t k = 0; k < n && !s->faulty; k++) {
+        check_split(w, &rows[k], k, vertex, there, s);
+        vertex += 2 * (rows[k].corners[0] + rows[k].corners[1] + rows[k].corners[2]);
+    }
+    free(there);
 }
 
 // --- the whole -------------------------------------------------------------------------------------------------------

@@ -24,4 +24,9 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
 /// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: those were taken too.
 void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s);
 
+struct bt_split_record;
+/// The same for the history of splits [n] with its vertices, for a world as it was in the beginning.
+void bt_state_check_splits(const bt_world *w, const struct bt_split_record *rows, int64_t n, const double *vertex,
+                           int64_t n_vertices, bt_snapshot *s);
+
 #endif

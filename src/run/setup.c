@@ -19,6 +19,7 @@
 #include "contact/law.h"
 #include "geometry/weld.h"
 #include "space/shore.h"
+#include "step/splitting.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_derived.h"
@@ -618,6 +619,25 @@ static bool check_apart(const bt_case *c, bt_world *w, const bt_roster *r, bt_er
     return false;
 }
 
+/// Ids for two pieces of every floe, twice, unless the case says how many.
+static bt_gid kept_ids(const bt_case *c, const bt_field *f)
+{
+    if (!getenv("BT_K")) return 0;
+    return 4 * ((bt_gid)f->n + c->n_floes);
+}
+
+static void create_splitting(const bt_case *c, bt_world *w, const bt_roster *r)
+{
+    if (r->n_kept == 0) return;
+    bt_splitting *s = w->splitting = bt_alloc(1, sizeof *s);
+    s->law = (bt_split_law){.toughness = atof(getenv("BT_K")), .strength = 300e3, .least_width = atof(getenv("BT_L")), .aspect = 6, .slop = w->par.slop};
+    s->generations = 5;
+    s->first = r->n_free;
+    s->reserve = r->n_kept;
+    s->rule = bt_impact_rule_of(c);
+    s->large = 0.5 * LARGE_RATIO * r->mean_size;
+}
+
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
 {
     double sum = 0, v[2 * BT_MAX_VERTICES];
@@ -635,7 +655,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
-    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size, .n_free = f->n};
+    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size, .n_free = f->n,
+                      .n_kept = kept_ids(c, f)};
     r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
     r->names = bt_alloc(5, sizeof *r->names);
     add_field(c, f, w, r);
@@ -648,6 +669,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     }
     const bool drifts = begin_drift(c, w, r, err);
     w->impacts = bt_impacts_create(c, w);
+    create_splitting(c, w, r);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
     *out = w;
