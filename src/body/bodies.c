@@ -137,10 +137,12 @@ void bt_bodies_skip(bt_bodies *b, bt_gid n)
 bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 {
     make_ids(b, 1);
-    return bt_bodies_put(b, d, b->n_global++);
+    const bt_gid gid = b->n_global++;
+    bt_bodies_put(b, d, gid);
+    return gid;
 }
 
-bt_gid bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid)
+bt_idx bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid)
 {
     assert(gid >= 0 && gid < b->n_global);
     assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
@@ -176,7 +178,7 @@ bt_gid bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid)
     b->cell[i][0] = b->cell[i][1] = 0;
     b->lap[i] = 0;
     bt_bodies_turn(b, i);
-    return gid;
+    return i;
 }
 
 void bt_bodies_compact(bt_bodies *b, const uint8_t *keep)

@@ -35,7 +35,7 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);
 /// Keep the next n ids for bodies that are put there later.
 void bt_bodies_skip(bt_bodies *b, bt_gid n);
 /// A body at the end of the storage, with an id that no body here has; returns it.
-bt_gid bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid);
+bt_idx bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid);
 /// Leave out the bodies that keep [n] does not say, and close the gaps: the others stay in their order. index_of is not
 /// brought up to date.
 void bt_bodies_compact(bt_bodies *b, const uint8_t *keep);
