@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 // The section along which a floe splits.
 //
-// Demand of a section, with N and M of section.h, h the thickness and l the length; f_t the thrust of the contacts at a
-// along it, f_i what of f_t the floe's inertia balances (the rest is held behind), w the length they bear on:
-//     near   N/(h l) - 6 M/(h l^2)                    at a; for a section without a load at a it is an end as any other
-//     far    N/(h l) + 6 M/(h l^2) - 0.45 f_i/(h l)   at b; a point load that goes through the depth of a beam relieves the
-//            far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4 times l, by finite elements
+// Demand of a section, with N and M of section.h, h the thickness and l the length; F_y the pair that opens it at a, f_t
+// the thrust of the contacts at a along it, f_i what of f_t the floe's inertia balances (the rest is held behind), w the
+// length they bear on:
+//     near   p + e at a,   p = 4 F_y/(h l) of the pair, e = N/(h l) - 6 M/(h l^2) - p of all other loads
+//     far    N/(h l) + 6 M/(h l^2) - 0.45 f_i/(h l)   at b; a point load that goes through the depth of a beam relieves
+//            the far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4 times l, by finite elements
 //     burst  (0.637 (1 - W^1.5)(f_t - f_i) + 0.43 (1 - W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
 //            tension across the line of a force: 2/pi is that of a disc between two points; both by finite elements
-// Each is held against the strength of its own place; they peak at different places, so that the largest of the ratios
-// counts, not their sum.
+// The strength of law.h with c = 0.75 belongs to a pair at the mouth of the crack, and to what closes it there: the ratio
+// at a is (p + min(e, 0))/sigma_0.75 + max(e, 0)/sigma_1.4, that of far and burst over sigma_1.4.
+// The three peak at different places, so that the largest of the ratios counts, not their sum.
 //
 // Sections that are looked at: from each of the largest contacts along its force, through the centroid, and to each
 // other of them; through the centroid across the most tensile axis of sum sym(x f); and across the long axis of the
@@ -167,9 +169,11 @@ static double demand(const search *s, bt_chord *c, double length, bt_split_mode 
                          (s->floe->thickness * b);
     const double strength = s->floe->factor * bt_split_strength(s->law, length, false);
     const double at_load = s->floe->factor * bt_split_strength(s->law, length, true);
+    const double pair = 4 * q.opening / hl, rest = near - pair;
+    const double opened = (pair + bt_min(0, rest)) / at_load + bt_max(0, rest) / strength;
     double ratio = far / strength;
     *mode = BT_SPLIT_FAR;
-    if (q.loaded && near / at_load > ratio) ratio = near / at_load, *mode = BT_SPLIT_NEAR;
+    if (opened > ratio) ratio = opened, *mode = q.opening > 0 ? BT_SPLIT_NEAR : BT_SPLIT_FAR;
     if (burst / strength > ratio) ratio = burst / strength, *mode = BT_SPLIT_BURST;
     return ratio;
 }
@@ -232,7 +236,7 @@ static void search_sections(const search *s)
         if (!bt_load_acts(w, k)) continue;
         const bt_floe_load *a = w->load[k].load;
         const double size = a->fx * a->fx + a->fy * a->fy;
-        if (!(size > 0)) continue;
+        if (!(size > 0 || a->opening > 0)) continue;
         if (n < BT_SPLIT_CONTACTS) {
             chosen[n++] = k;
             continue;

@@ -185,7 +185,7 @@ bt_section bt_section_of(const bt_split_floe *f, double area, double polar, cons
 
     const double at_a = c->a.edge + c->a.t, at_b = c->b.edge + c->b.t, n = f->n;
     const double left = at_a >= at_b ? at_a - at_b : at_a - at_b + n;
-    double opened = 0, opened_far = 0;
+    double opening_b = 0;
     for (int k = 0; k < loads->n; k++) {
         if (!bt_load_acts(loads, k)) continue;
         const bt_edge_load *e = &loads->load[k];
@@ -200,19 +200,21 @@ bt_section bt_section_of(const bt_split_floe *f, double area, double polar, cons
         }
         const double reach = slop + force->length / 2;
         const double pair = force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
-        if (bt_hypot(e->x - a[0], e->y - a[1]) <= reach) {
+        const double from_end_a = bt_hypot(e->x - a[0], e->y - a[1]), from_end_b = bt_hypot(e->x - b[0], e->y - b[1]);
+        if (bt_min(from_end_a, from_end_b) > reach) continue;
+        if (from_end_a <= from_end_b) {
             s.loaded = true;
             s.thrust += force->fx * dx + force->fy * dy;
             s.bearing += force->length;
-            opened += pair;
-        } else if (bt_hypot(e->x - b[0], e->y - b[1]) <= reach) {
-            opened_far += pair;
+            s.opening += pair;
+        } else {
+            opening_b += pair;
         }
     }
     s.thrust = bt_max(0, s.thrust);
     s.inertial = bt_min(s.thrust, bt_max(0, loads->fx * dx + loads->fy * dy));
     s.width = area / l;
-    s.normal = qx * nx + qy * ny + opened + opened_far;
-    s.moment = moment + (opened_far - opened) * l / 2;
+    s.normal = qx * nx + qy * ny + s.opening + opening_b;
+    s.moment = moment + (opening_b - s.opening) * l / 2;
     return s;
 }

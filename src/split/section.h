@@ -71,6 +71,7 @@ typedef struct bt_section {
     double width;   ///< of the floe across it, A/l, m
     double normal;  ///< N, with opening pairs, N
     double moment;  ///< M, with opening pairs, N m
+    double opening; ///< of the pairs at a, across the section, N; it adds F_y to N and -F_y l/2 to M
     double thrust;  ///< of the contacts at a along the section, N
     double inertial;///< the part of it that the floe's inertia balances, N
     double bearing; ///< length of the contacts at a, m
