@@ -212,7 +212,9 @@ static void consider_from(const search *s, bt_chord_end from, double dx, double 
 static void consider_through(const search *s, double x, double y, double dx, double dy)
 {
     bt_chord c;
-    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c);
+    if (!bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) return;
+    consider(s, c);
+    consider(s, (bt_chord){c.b, c.a}); // the line has no direction, and either end may be at a load
 }
 
 /// Unit vector of the larger eigenvalue of a symmetric 2 x 2 matrix; false when both are equal to a part `tiny` of scale.
