@@ -226,8 +226,8 @@ static void test_free_thrust(void **state)
     assert_within(q.normal, 0, 1e-12);
     assert_near(q.moment, l / 8, 1e-12);
     assert_near(q.normal / l - 6 * q.moment / (l * l), -0.75 / l, 1e-12);
-    assert_near(q.thrust, 1, 1e-15);
-    assert_near(q.inertial, 1, 1e-15);
+    assert_near(q.at[0].thrust, 1, 1e-15);
+    assert_near(q.at[0].inertial, 1, 1e-15);
     bt_split best;
     assert_near(critical(&s, &load, 1, &law, &best), bt_split_strength(&law, l, false) * h * l / 0.43, 1e-8);
     assert_int_equal(best.mode, BT_SPLIT_BURST);
@@ -414,15 +414,20 @@ static double ratio_of(const bt_split_floe *s, const bt_load_case *w, const bt_s
 {
     const bt_moments m = bt_shape_extent(s->n, s->outline);
     const bt_section q = bt_section_of(s, m.area, m.polar, w, c, law->slop);
-    const double l = q.length, b = fmin(m.area / l, l), share = fmin(1, q.bearing / b);
-    const double pair = 4 * q.opening / l, rest = q.normal / l - 6 * q.moment / (l * l) - pair;
-    const double far = q.normal / l + (6 * q.moment / l - 0.45 * q.inertial) / l;
-    const double burst =
-        (0.637 * (1 - pow(share, 1.5)) * (q.thrust - q.inertial) + 0.43 * (1 - share) * q.inertial) / b;
-    const double opened = (pair + fmin(0, rest)) / bt_split_strength(law, l, true);
-    return fmax(opened + fmax(0, rest) / bt_split_strength(law, l, false),
-                fmax(far, burst) / bt_split_strength(law, l, false)) /
-           s->thickness;
+    const double l = q.length, b = fmin(m.area / l, l), weak = bt_split_strength(law, l, true),
+                 strong = bt_split_strength(law, l, false);
+    double worst = 0;
+    for (int at = 0; at < 2; at++) {
+        const bt_section_end *e = &q.at[at];
+        const double share = fmin(1, e->bearing / b), pair = 4 * e->opening / l;
+        const double bending = (at ? 6 : -6) * q.moment / (l * l);
+        const double rest = q.normal / l + bending - 0.45 * q.at[1 - at].inertial / l - pair;
+        const double burst =
+            (0.637 * (1 - pow(share, 1.5)) * (e->thrust - e->inertial) + 0.43 * (1 - share) * e->inertial) / b;
+        worst = fmax(worst, burst / strong);
+        worst = fmax(worst, (pair + fmin(0, rest)) / weak + fmax(0, rest) / strong);
+    }
+    return worst / s->thickness;
 }
 
 /// No section at all is above the bound, and where the quick reject says that nothing can split, nothing does.
