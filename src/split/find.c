@@ -25,14 +25,15 @@
 //
 // Quick reject. With G = sum |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
 // D = 2 R, and loads on the outline:
-//     |N| <= G + |T| sqrt(A/J)/2 + P:   a load pulls at the section by at most itself, less its share of the inertia;
+//     |N| <= G + |T| sqrt(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
 //         |S1| = |S2|, so each is at most half of int r dA <= sqrt(A J).
-//     |M| <= D G + |T| (1 + R sqrt(A/J))/2 + P l/2:   M is that of either part, so at most the mean of both: of loads
-//         and F, D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
+//     |M| <= D G + |T| (1 + R sqrt(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
+//         D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
 // A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and l < 2 r,
 // the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines from its
 // ends through those of the section meet beyond it: the part lies in their triangle, no wider than d = D l/(2 r - l).
-//     |M| <= d (2 G + |T| R A/J) + P l/2
+//     |M| <= d (2 G + |T| R A/J)
+// Pairs add p <= 4 P/(h l) at their own end and press on the other.
 // Both bounds over l and l^2 fall with l, and the second is above the first from l = r on; so a bound at the least length
 // is one for all.
 #include "split/find.h"
@@ -79,17 +80,18 @@ static double bound(const bt_split_floe *f, const form *o, double size, double t
                     const bt_split_law *law, double l)
 {
     const double d = 2 * o->radius, ratio = o->area / o->polar, g = o->radius * sqrt(ratio);
-    const double normal = size + torque * sqrt(ratio) / 2 + opening;
+    const double normal = size + torque * sqrt(ratio) / 2;
     double moment = d * size + torque * (1 + g) / 2;
     if (l < o->inradius) {
         const double cap = d * l / (2 * o->inradius - l) + 2 * law->slop;
         moment = bt_min(moment, cap * (2 * size + torque * o->radius * ratio));
     }
-    moment += opening * l / 2;
-    const double bending = (normal + 6 * moment / l) / (f->thickness * l) / bt_split_strength(law, l, true);
-    const double far = bt_split_strength(law, d, false), short_far = bt_split_strength(law, l, false);
-    const double burst = BURST_HELD * size / f->thickness * bt_max(d / (o->area * far), 1 / (l * short_far));
-    return bt_max(bending, burst) / f->factor;
+    const double strength = bt_split_strength(law, l, false), hl = f->thickness * l;
+    double most = (normal + 6 * moment / l) / (hl * strength);
+    if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, l, true));
+    // b = l of burst is below that; b = A/l is largest at l = D
+    return bt_max(most, BURST_HELD * size * d / (f->thickness * o->area * bt_split_strength(law, d, false))) /
+           f->factor;
 }
 
 double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l)

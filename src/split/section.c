@@ -131,6 +131,7 @@ bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, d
     bt_chord_place(f->n, f->outline, e.place, p);
     e.x = p[0], e.y = p[1];
     e.part[0].x = p[0], e.part[0].y = p[1], e.part[0].position = e.place.edge + e.place.t;
+    e.mean_x = p[0], e.mean_y = p[1];
     if (!(load->length / 4 > slop)) return e;
     e.parts = 2;
     for (int i = 0; i < 2; i++) {
@@ -140,6 +141,7 @@ bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, d
         bt_chord_place(f->n, f->outline, at, p);
         e.part[i].x = p[0], e.part[i].y = p[1], e.part[i].position = at.edge + at.t;
     }
+    e.mean_x = (e.part[0].x + e.part[1].x) / 2, e.mean_y = (e.part[0].y + e.part[1].y) / 2;
     return e;
 }
 
@@ -152,8 +154,7 @@ bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak)
         c.fx += f->fx, c.fy += f->fy;
         c.size += bt_hypot(f->fx, f->fy);
         c.opening += f->opening;
-        for (int i = 0; i < load[k].parts; i++)
-            c.torque += cross(load[k].part[i].x, load[k].part[i].y, f->fx, f->fy) / load[k].parts;
+        c.torque += cross(load[k].mean_x, load[k].mean_y, f->fx, f->fy);
     }
     return c;
 }
@@ -192,17 +193,23 @@ bt_section bt_section_of(const bt_split_floe *f, double area, double polar, cons
         if (!bt_load_acts(loads, k)) continue;
         const bt_edge_load *e = &loads->load[k];
         const bt_floe_load *force = e->load;
+        const double from_a = square(e->x - a[0], e->y - a[1]), from_b = square(e->x - b[0], e->y - b[1]);
+        const double reach = slop + force->length / 2;
+        if (bt_min(from_a, from_b) > reach * reach) {
+            const double position = e->place.edge + e->place.t;
+            if (!((position >= at_b ? position - at_b : position - at_b + n) < left)) continue;
+            qx += force->fx, qy += force->fy;
+            moment += cross(e->mean_x - mx, e->mean_y - my, force->fx, force->fy);
+            continue;
+        }
         for (int i = 0; i < e->parts; i++) {
             const double x = e->part[i].x, y = e->part[i].y, position = e->part[i].position;
-            const double from_b = position >= at_b ? position - at_b : position - at_b + n;
+            const double after_b = position >= at_b ? position - at_b : position - at_b + n;
             const bool at_end = square(x - a[0], y - a[1]) <= near2 || square(x - b[0], y - b[1]) <= near2;
-            const double share = (at_end ? 0.5 : from_b < left ? 1 : 0) / e->parts;
+            const double share = (at_end ? 0.5 : after_b < left ? 1 : 0) / e->parts;
             qx += share * force->fx, qy += share * force->fy;
             moment += share * cross(x - mx, y - my, force->fx, force->fy);
         }
-        const double reach = slop + force->length / 2;
-        const double from_a = square(e->x - a[0], e->y - a[1]), from_b = square(e->x - b[0], e->y - b[1]);
-        if (bt_min(from_a, from_b) > reach * reach) continue;
         const int end = from_a <= from_b ? 0 : 1;
         s.at[end].opening += force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
         s.at[end].thrust += (end ? -1 : 1) * (force->fx * dx + force->fy * dy);

@@ -49,6 +49,7 @@ typedef struct bt_edge_load {
     const bt_floe_load *load;
     bt_chord_end place;
     double x, y;              ///< of it, m
+    double mean_x, mean_y;    ///< of the parts, m
     int parts;                ///< 1, or 2 half loads at +-w/4 along the edge
     struct {
         double x, y;          ///< m, on the outline
