@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: MIT
 // The section along which a floe splits.
 //
-// Demand of a section, with N and M of section.h, h the thickness and l the length; f_t the thrust of the contacts at a
-// along it, f_i what of f_t the floe's inertia balances (the rest is held behind), w the length they bear on:
-//     near   N/(h l) - 6 M/(h l^2)                    at a; for a section without a load at a it is an end as any other
-//     far    N/(h l) + 6 M/(h l^2) - 0.45 f_i/(h l)   at b; a point load that goes through the depth of a beam relieves the
-//            far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4 times l, by finite elements
-//     burst  (0.637 (1 - W^1.5)(f_t - f_i) + 0.43 (1 - W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
-//            tension across the line of a force: 2/pi is that of a disc between two points; both by finite elements
-// Each is held against the strength of its own place; they peak at different places, so that the largest of the ratios
-// counts, not their sum.
+// Demand of a section, with N and M of section.h, h the thickness and l the length. At each end of it
+//     s = (N -+ 6 M/l - 0.45 f_i)/(h l) = p + e,   - at a, + at b
+// p = 4 F_y/(h l) of the pair that opens it there; f_i is the thrust at the other end that the floe's inertia balances: a
+// point load that goes through the depth of a beam relieves the far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4
+// times l, by finite elements. Across the section, with f_t the thrust of the contacts at an end along it, f_i its part
+// that inertia balances (the rest is held behind), and w the length they bear on,
+//     t = (0.637 (1 - W^1.5)(f_t - f_i) + 0.43 (1 - W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
+// 0.637 = 2/pi is that of a disc between two points; both by finite elements. The strength of law.h with c = 0.75 belongs
+// to a pair at the mouth of the crack, and to what closes it there:
+//     near   p > 0:  (p + min(e, 0))/sigma_0.75 + max(e, 0)/sigma_1.4
+//     far    p = 0:  e/sigma_1.4
+//     burst          t/sigma_1.4
+// The three peak at different places, so that the largest of the ratios counts, not their sum.
 //
-// Sections that are looked at: from each of the largest contacts along its force, through the centroid, and to each
+// Sections that are looked at: from each of the largest contacts (up to
+// 8 with a tenth of the largest load or more) along its force, through the centroid, and to each
 // other of them; through the centroid across the most tensile axis of sum sym(x f); and across the long axis of the
 // floe at its centroid and at a third and two thirds of its length: a strip that is struck at its end breaks at a third.
 // A corner of which less than the least width would break off is not looked at: no section is shorter than that. A
@@ -20,14 +25,15 @@
 //
 // Quick reject. With G = sum |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
 // D = 2 R, and loads on the outline:
-//     |N| <= G + |T| sqrt(A/J)/2 + P:   a load pulls at the section by at most itself, less its share of the inertia;
+//     |N| <= G + |T| sqrt(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
 //         |S1| = |S2|, so each is at most half of int r dA <= sqrt(A J).
-//     |M| <= D G + |T| (1 + R sqrt(A/J))/2 + P l/2:   M is that of either part, so at most the mean of both: of loads
-//         and F, D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
+//     |M| <= D G + |T| (1 + R sqrt(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
+//         D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
 // A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and l < 2 r,
 // the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines from its
 // ends through those of the section meet beyond it: the part lies in their triangle, no wider than d = D l/(2 r - l).
-//     |M| <= d (2 G + |T| R A/J) + P l/2
+//     |M| <= d (2 G + |T| R A/J)
+// Pairs add p <= 4 P/(h l) at their own end and press on the other.
 // Both bounds over l and l^2 fall with l, and the second is above the first from l = r on; so a bound at the least length
 // is one for all.
 #include "split/find.h"
@@ -40,6 +46,7 @@
 #include <string.h>
 
 static const double BURST_HELD = 0.637, BURST_FREE = 0.43, FAR_RELIEF = 0.45;
+static const double LEAST_LOAD = 0.1; // / the largest load: sections are looked for from contacts that carry more
 static const double EQUAL = 1e-9;    // ratios that differ by less are equal
 static const double COMPACT = 0.1;   // second moments along both axes that differ by less of their sum: no long axis
 
@@ -73,17 +80,18 @@ static double bound(const bt_split_floe *f, const form *o, double size, double t
                     const bt_split_law *law, double l)
 {
     const double d = 2 * o->radius, ratio = o->area / o->polar, g = o->radius * sqrt(ratio);
-    const double normal = size + torque * sqrt(ratio) / 2 + opening;
+    const double normal = size + torque * sqrt(ratio) / 2;
     double moment = d * size + torque * (1 + g) / 2;
     if (l < o->inradius) {
         const double cap = d * l / (2 * o->inradius - l) + 2 * law->slop;
         moment = bt_min(moment, cap * (2 * size + torque * o->radius * ratio));
     }
-    moment += opening * l / 2;
-    const double bending = (normal + 6 * moment / l) / (f->thickness * l) / bt_split_strength(law, l, true);
-    const double far = bt_split_strength(law, d, false), short_far = bt_split_strength(law, l, false);
-    const double burst = BURST_HELD * size / f->thickness * bt_max(d / (o->area * far), 1 / (l * short_far));
-    return bt_max(bending, burst) / f->factor;
+    const double strength = bt_split_strength(law, l, false), hl = f->thickness * l;
+    double most = (normal + 6 * moment / l) / (hl * strength);
+    if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, l, true));
+    // b = l of burst is below that; b = A/l is largest at l = D
+    return bt_max(most, BURST_HELD * size * d / (f->thickness * o->area * bt_split_strength(law, d, false))) /
+           f->factor;
 }
 
 double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l)
@@ -151,30 +159,32 @@ typedef struct search {
     bt_split *best;
 } search;
 
-/// Largest stress / strength of a section, and where. A section without a load at a is turned so that bending opens b.
-static double demand(const search *s, bt_chord *c, double length, bt_split_mode *mode)
+/// Largest stress / strength of a section.
+static double demand(const search *s, const bt_section *q, bt_split_mode *mode)
 {
-    bt_section q = bt_section_of(s->floe, s->form->area, s->form->polar, s->loads, c, s->law->slop);
-    if (!q.loaded && q.moment < 0) {
-        *c = (bt_chord){c->b, c->a};
-        q = bt_section_of(s->floe, s->form->area, s->form->polar, s->loads, c, s->law->slop);
-    }
-    const double hl = s->floe->thickness * length, bending = 6 * q.moment / length;
-    const double near = (q.normal - bending) / hl, far = (q.normal + bending - FAR_RELIEF * q.inertial) / hl;
-    const double b = bt_min(q.width, length), share = bt_min(1, q.bearing / b);
-    const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (q.thrust - q.inertial) +
-                          BURST_FREE * (1 - share) * q.inertial) /
-                         (s->floe->thickness * b);
-    const double strength = s->floe->factor * bt_split_strength(s->law, length, false);
-    const double at_load = s->floe->factor * bt_split_strength(s->law, length, true);
-    double ratio = far / strength;
+    const double l = q->length, hl = s->floe->thickness * l, b = bt_min(q->width, l);
+    const double strength = s->floe->factor * bt_split_strength(s->law, l, false);
+    double worst = 0;
     *mode = BT_SPLIT_FAR;
-    if (q.loaded && near / at_load > ratio) ratio = near / at_load, *mode = BT_SPLIT_NEAR;
-    if (burst / strength > ratio) ratio = burst / strength, *mode = BT_SPLIT_BURST;
-    return ratio;
+    for (int k = 0; k < 2; k++) {
+        const bt_section_end *e = &q->at[k], *opposite = &q->at[1 - k];
+        const double pair = 4 * e->opening / hl, share = bt_min(1, e->bearing / b);
+        const double rest =
+            (q->normal + (k ? 6 : -6) * q->moment / l - FAR_RELIEF * opposite->inertial) / hl - pair;
+        double ratio = bt_max(0, rest) / strength;
+        if (pair > 0) ratio += (pair + bt_min(0, rest)) / (s->floe->factor * bt_split_strength(s->law, l, true));
+        if (ratio > worst) worst = ratio, *mode = pair > 0 ? BT_SPLIT_NEAR : BT_SPLIT_FAR;
+        const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (e->thrust - e->inertial) +
+                              BURST_FREE * (1 - share) * e->inertial) /
+                             (s->floe->thickness * b * strength);
+        if (burst > worst) worst = burst, *mode = BT_SPLIT_BURST;
+    }
+    return worst;
 }
 
-static void consider(const search *s, bt_chord c)
+/// Take a section when it is the best so far. One from a contact keeps its direction, another is turned so that bending
+/// opens b: where both pieces are equal, the direction says which is the first.
+static void consider(const search *s, bt_chord c, bool from_contact)
 {
     double a[2], b[2];
     bt_chord_place(s->floe->n, s->floe->outline, c.a, a);
@@ -183,8 +193,10 @@ static void consider(const search *s, bt_chord c)
     const bt_load_case *w = s->loads;
     if (!(l >= s->law->least_width) || !(l > s->law->slop)) return;
     if (!(bound(s->floe, s->form, w->size, fabs(w->torque), w->opening, s->law, l) > 1)) return;
+    const bt_section q = bt_section_of(s->floe, s->form->area, s->form->polar, w, &c, s->law->slop);
     bt_split_mode mode;
-    const double ratio = demand(s, &c, l, &mode);
+    const double ratio = demand(s, &q, &mode);
+    if (!from_contact && q.moment < 0) c = (bt_chord){c.b, c.a};
     bt_split *best = s->best;
     if (!(ratio > 1) || !(ratio > best->ratio * (1 + EQUAL))) return;
     const bt_split_refusal refused = refusal_of(s->floe, &c, s->law);
@@ -202,13 +214,13 @@ static void consider(const search *s, bt_chord c)
 static void consider_from(const search *s, bt_chord_end from, double dx, double dy)
 {
     bt_chord c;
-    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &c)) consider(s, c);
+    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &c)) consider(s, c, true);
 }
 
 static void consider_through(const search *s, double x, double y, double dx, double dy)
 {
     bt_chord c;
-    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c);
+    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c, false);
 }
 
 /// Unit vector of the larger eigenvalue of a symmetric 2 x 2 matrix; false when both are equal to a part `tiny` of scale.
@@ -222,29 +234,30 @@ static bool major_axis(double xx, double xy, double yy, double tiny, double *x, 
     return true;
 }
 
+static double load_size(const bt_load_case *w, int k)
+{
+    return bt_hypot(w->load[k].load->fx, w->load[k].load->fy) + w->load[k].load->opening;
+}
+
 static void search_sections(const search *s)
 {
     const bt_load_case *w = s->loads;
     const bt_split_floe *f = s->floe;
     // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two are equal.
     int chosen[BT_SPLIT_CONTACTS], n = 0;
+    double largest = 0;
+    for (int k = 0; k < w->n; k++)
+        if (bt_load_acts(w, k)) largest = bt_max(largest, load_size(w, k));
     for (int k = 0; k < w->n; k++) {
-        if (!bt_load_acts(w, k)) continue;
-        const bt_floe_load *a = w->load[k].load;
-        const double size = a->fx * a->fx + a->fy * a->fy;
-        if (!(size > 0)) continue;
+        if (!bt_load_acts(w, k) || !(load_size(w, k) > LEAST_LOAD * largest)) continue;
         if (n < BT_SPLIT_CONTACTS) {
             chosen[n++] = k;
             continue;
         }
-        int least = -1;
-        double least_size = size;
-        for (int i = 0; i < n; i++) {
-            const bt_floe_load *b = w->load[chosen[i]].load;
-            const double other = b->fx * b->fx + b->fy * b->fy;
-            if (other < least_size) least_size = other, least = i;
-        }
-        if (least < 0) continue;
+        int least = 0;
+        for (int i = 1; i < n; i++)
+            if (load_size(w, chosen[i]) < load_size(w, chosen[least])) least = i;
+        if (!(load_size(w, k) > load_size(w, chosen[least]))) continue;
         memmove(chosen + least, chosen + least + 1, (size_t)(n - 1 - least) * sizeof *chosen);
         chosen[n - 1] = k;
     }
@@ -253,7 +266,8 @@ static void search_sections(const search *s)
         const bt_edge_load *e = &w->load[chosen[i]];
         consider_from(s, e->place, e->load->fx, e->load->fy);
         consider_from(s, e->place, -e->x, -e->y);
-        for (int j = 0; j < n; j++) {
+        // Both ends of a section are looked at; in an outline that is not convex the way back may be another.
+        for (int j = f->convex ? i + 1 : 0; j < n; j++) {
             const bt_edge_load *other = &w->load[chosen[j]];
             if (j != i) consider_from(s, e->place, other->x - e->x, other->y - e->y);
         }

@@ -5,13 +5,13 @@
 
 #include <math.h>
 
-static const double NEAR_FACTOR = 0.75, FAR_FACTOR = 1.4; // c of law.h
+static const double PAIR_FACTOR = 0.75, FACTOR = 1.4; // c of law.h
 static const double YOUNG = 5e9, POISSON = 0.3;           // of full-scale sea ice, assumed: 2 to 6 GPa are in use
 
-double bt_split_strength(const bt_split_law *law, double l, bool loaded)
+double bt_split_strength(const bt_split_law *law, double l, bool pair)
 {
     // sqrt(l/l0) and not l/l0: a toughness without limit, to switch fracture off, must not overflow.
-    const double x = law->strength * sqrt(l) / ((loaded ? NEAR_FACTOR : FAR_FACTOR) * law->toughness);
+    const double x = law->strength * sqrt(l) / ((pair ? PAIR_FACTOR : FACTOR) * law->toughness);
     return law->strength / sqrt(1 + x * x);
 }
 

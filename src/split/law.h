@@ -4,8 +4,8 @@
 // Strength with a size effect. A long section is as strong as linear elastic fracture mechanics says, K its toughness; a
 // short one as strong as the ice without a crack, sigma_t:
 //     sigma_c(l) = sigma_t / sqrt(1 + l/l0),   l0 = (c K / sigma_t)^2,   so that sigma_c -> c K/sqrt(l) for l >> l0.
-// c = 0.75 at the end of the section where a load stands: the load of an opening pair at the mouth of an edge crack in a
-// free square is least at a crack of 0.145 l and there 0.187 h K sqrt(l), a nominal stress of 4 x 0.187 K/sqrt(l).
+// c = 0.75 where a pair of forces opens the mouth of the crack: in a free square its force is largest at a crack of
+// 0.145 l, 0.187 h K sqrt(l), a nominal stress of 4 x 0.187 K/sqrt(l).
 // c = 1.4 elsewhere: an edge crack, or a buried one, of that length under the stress of bending.
 #ifndef BT_SPLIT_LAW_H
 #define BT_SPLIT_LAW_H
@@ -34,8 +34,8 @@ typedef struct bt_split_law {
 
 enum { BT_SPLIT_CONTACTS = 8 }; ///< sections are looked for from so many contacts of a floe, the largest
 
-/// sigma_c of a section of length l, m, at a load (or elsewhere), Pa.
-double bt_split_strength(const bt_split_law *law, double l, bool loaded);
+/// sigma_c of a section of length l, m, against a pair that opens it (or any other stress), Pa.
+double bt_split_strength(const bt_split_law *law, double l, bool pair);
 
 /// Share of the strength that a floe has: Weibull of this modulus and median 1,
 ///     (-ln u / ln 2)^(1/modulus),   u uniform of (seed, ancestor, path) alone.

@@ -8,6 +8,7 @@
 #include <string.h>
 
 static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
+static double square(double x, double y) { return x * x + y * y; }
 
 void bt_chord_place(int n, const double *v, bt_chord_end e, double p[2])
 {
@@ -117,7 +118,9 @@ int bt_chord_piece(int n, const double *v, const bt_chord *c, double *out)
     int between = a.edge - b.edge;
     if (between < 0 || (between == 0 && b.t > a.t)) between += n;
     if (a.t == 0 && between > 0) between--;
-    for (int i = 0; i < between; i++) memcpy(out + 2 * (i + 2), v + 2 * ((b.edge + 1 + i) % n), 2 * sizeof *out);
+    const int first = b.edge + 1 < n ? b.edge + 1 : 0, straight = between < n - first ? between : n - first;
+    memcpy(out + 4, v + 2 * first, 2 * (size_t)straight * sizeof *out);
+    memcpy(out + 4 + 2 * straight, v, 2 * (size_t)(between - straight) * sizeof *out);
     return between + 2;
 }
 
@@ -128,6 +131,7 @@ bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, d
     bt_chord_place(f->n, f->outline, e.place, p);
     e.x = p[0], e.y = p[1];
     e.part[0].x = p[0], e.part[0].y = p[1], e.part[0].position = e.place.edge + e.place.t;
+    e.mean_x = p[0], e.mean_y = p[1];
     if (!(load->length / 4 > slop)) return e;
     e.parts = 2;
     for (int i = 0; i < 2; i++) {
@@ -137,6 +141,7 @@ bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, d
         bt_chord_place(f->n, f->outline, at, p);
         e.part[i].x = p[0], e.part[i].y = p[1], e.part[i].position = at.edge + at.t;
     }
+    e.mean_x = (e.part[0].x + e.part[1].x) / 2, e.mean_y = (e.part[0].y + e.part[1].y) / 2;
     return e;
 }
 
@@ -149,8 +154,7 @@ bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak)
         c.fx += f->fx, c.fy += f->fy;
         c.size += bt_hypot(f->fx, f->fy);
         c.opening += f->opening;
-        for (int i = 0; i < load[k].parts; i++)
-            c.torque += cross(load[k].part[i].x, load[k].part[i].y, f->fx, f->fy) / load[k].parts;
+        c.torque += cross(load[k].mean_x, load[k].mean_y, f->fx, f->fy);
     }
     return c;
 }
@@ -184,35 +188,39 @@ bt_section bt_section_of(const bt_split_floe *f, double area, double polar, cons
     double moment = -cross(sx, sy, loads->fx, loads->fy) / area - turn * polar1 - cross(mx, my, qx, qy);
 
     const double at_a = c->a.edge + c->a.t, at_b = c->b.edge + c->b.t, n = f->n;
-    const double left = at_a >= at_b ? at_a - at_b : at_a - at_b + n;
-    double opened = 0, opened_far = 0;
+    const double left = at_a >= at_b ? at_a - at_b : at_a - at_b + n, near2 = slop * slop;
     for (int k = 0; k < loads->n; k++) {
         if (!bt_load_acts(loads, k)) continue;
         const bt_edge_load *e = &loads->load[k];
         const bt_floe_load *force = e->load;
+        const double from_a = square(e->x - a[0], e->y - a[1]), from_b = square(e->x - b[0], e->y - b[1]);
+        const double reach = slop + force->length / 2;
+        if (bt_min(from_a, from_b) > reach * reach) {
+            const double position = e->place.edge + e->place.t;
+            if (!((position >= at_b ? position - at_b : position - at_b + n) < left)) continue;
+            qx += force->fx, qy += force->fy;
+            moment += cross(e->mean_x - mx, e->mean_y - my, force->fx, force->fy);
+            continue;
+        }
         for (int i = 0; i < e->parts; i++) {
             const double x = e->part[i].x, y = e->part[i].y, position = e->part[i].position;
-            const double from_b = position >= at_b ? position - at_b : position - at_b + n;
-            const bool at_end = bt_hypot(x - a[0], y - a[1]) <= slop || bt_hypot(x - b[0], y - b[1]) <= slop;
-            const double share = (at_end ? 0.5 : from_b < left ? 1 : 0) / e->parts;
+            const double after_b = position >= at_b ? position - at_b : position - at_b + n;
+            const bool at_end = square(x - a[0], y - a[1]) <= near2 || square(x - b[0], y - b[1]) <= near2;
+            const double share = (at_end ? 0.5 : after_b < left ? 1 : 0) / e->parts;
             qx += share * force->fx, qy += share * force->fy;
             moment += share * cross(x - mx, y - my, force->fx, force->fy);
         }
-        const double reach = slop + force->length / 2;
-        const double pair = force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
-        if (bt_hypot(e->x - a[0], e->y - a[1]) <= reach) {
-            s.loaded = true;
-            s.thrust += force->fx * dx + force->fy * dy;
-            s.bearing += force->length;
-            opened += pair;
-        } else if (bt_hypot(e->x - b[0], e->y - b[1]) <= reach) {
-            opened_far += pair;
-        }
+        const int end = from_a <= from_b ? 0 : 1;
+        s.at[end].opening += force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
+        s.at[end].thrust += (end ? -1 : 1) * (force->fx * dx + force->fy * dy);
+        s.at[end].bearing += force->length;
     }
-    s.thrust = bt_max(0, s.thrust);
-    s.inertial = bt_min(s.thrust, bt_max(0, loads->fx * dx + loads->fy * dy));
+    for (int end = 0; end < 2; end++) {
+        s.at[end].thrust = bt_max(0, s.at[end].thrust);
+        s.at[end].inertial = bt_min(s.at[end].thrust, bt_max(0, (end ? -1 : 1) * (loads->fx * dx + loads->fy * dy)));
+    }
     s.width = area / l;
-    s.normal = qx * nx + qy * ny + opened + opened_far;
-    s.moment = moment + (opened_far - opened) * l / 2;
+    s.normal = qx * nx + qy * ny + s.at[0].opening + s.at[1].opening;
+    s.moment = moment + (s.at[1].opening - s.at[0].opening) * l / 2;
     return s;
 }

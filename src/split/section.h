@@ -49,6 +49,7 @@ typedef struct bt_edge_load {
     const bt_floe_load *load;
     bt_chord_end place;
     double x, y;              ///< of it, m
+    double mean_x, mean_y;    ///< of the parts, m
     int parts;                ///< 1, or 2 half loads at +-w/4 along the edge
     struct {
         double x, y;          ///< m, on the outline
@@ -65,16 +66,21 @@ typedef struct bt_load_case {
     double size, opening;             ///< sums of |f_k| and of opening forces, N
 } bt_load_case;
 
+/// Contacts at one end of a section.
+typedef struct bt_section_end {
+    double opening;  ///< of their pairs, across the section, F_y, N: it adds F_y to N and F_y l/2 to M, < 0 at a
+    double thrust;   ///< along the section, into it, N
+    double inertial; ///< the part of it that the floe's inertia balances, N
+    double bearing;  ///< length that they bear on, m
+} bt_section_end;
+
 /// What a section carries.
 typedef struct bt_section {
-    double length;  ///< l, m
-    double width;   ///< of the floe across it, A/l, m
-    double normal;  ///< N, with opening pairs, N
-    double moment;  ///< M, with opening pairs, N m
-    double thrust;  ///< of the contacts at a along the section, N
-    double inertial;///< the part of it that the floe's inertia balances, N
-    double bearing; ///< length of the contacts at a, m
-    bool loaded;    ///< is there a contact at a?
+    double length;        ///< l, m
+    double width;         ///< of the floe across it, A/l, m
+    double normal;        ///< N, with opening pairs, N
+    double moment;        ///< M, with opening pairs, N m
+    bt_section_end at[2]; ///< a and b
 } bt_section;
 
 /// Does load k act in this case?
