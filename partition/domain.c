@@ -82,11 +82,14 @@ void bt_domain_follow(bt_world *w, const bt_idx *from)
     bt_domain *d = w->domain;
     if (!d || !d->distributed) return;
     const bt_idx n = w->bodies.n;
-    uint8_t *owned = bt_alloc((size_t)n, sizeof *owned);
+    if (n > d->cap_owned) {
+        d->cap_owned = n;
+        d->touched = bt_realloc(d->touched, (size_t)n, 1);
+    }
+    uint8_t *owned = bt_alloc((size_t)d->cap_owned, sizeof *owned);
     for (bt_idx i = 0; i < n; i++) owned[i] = d->owned[from[i]];
     free(d->owned);
     d->owned = owned;
-    d->cap_owned = n;
 }
 
 // --- sums ------------------------------------------------------------------------------------------------------------
