@@ -197,6 +197,7 @@ typedef struct bt_run_totals {
     uint64_t state_hash;
     const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     const struct bt_undisturbed *undisturbed; ///< ice, at the end of the run; NULL where no body is towed
+    const struct bt_splitting *splitting; ///< at the end of the run, NULL where floes do not split
     bt_phases phases, shared; ///< the second: of it, in passes that several threads share
     bt_call call;                ///< `end` is that of the summary's own time
     double stepped;              ///< bt_clock after the last step of this call

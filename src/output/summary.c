@@ -18,6 +18,7 @@
 #include "base/ascending.h"
 #include "base/elementary.h"
 #include "solve/locked.h"
+#include "step/splitting.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -180,6 +181,23 @@ static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_run_tota
 }
 
 /// What the bodies came to.
+static void warn_of_splits(bt_summary *s, const bt_run_totals *t)
+{
+    const bt_split_totals *p = &t->splitting->total;
+    if (p->deferred > 0)
+        bt_warn(&s->warnings, BT_WARN_SPLIT_DEFERRED,
+                "%lld floes were left to split in the next step after %d rounds: loads of their steps may be too high",
+                (long long)p->deferred, BT_SPLIT_ROUNDS);
+    if (p->no_id > 0)
+        bt_warn(&s->warnings, BT_WARN_SPLIT_RESERVE,
+                "%lld floes could not split, as all ids for %lld pieces were used; raise ice.splitting.reserve",
+                (long long)p->no_id, (long long)t->splitting->reserve);
+    if (p->unconverged > 0)
+        bt_warn(&s->warnings, BT_WARN_SPLIT_UNCONVERGED,
+                "%lld of %lld steps did not converge, and no floe split in them; raise solver.max_sweeps or lower run.dt",
+                (long long)p->unconverged, (long long)t->n_steps);
+}
+
 static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
 {
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
@@ -191,6 +209,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
         if (bt_laws[law]->warn)
             bt_laws[law]->warn(h->laws + bt_law_first_total(law), t->mean_size, &s->warnings);
     }
+    if (t->splitting) warn_of_splits(s, t);
     if (t->stall.inside > 0)
         bt_warn(&s->warnings, BT_WARN_END_INSIDE,
                 "the towing end was within the hull for %.3g s, from %.4g s on: a following current, a tow that "

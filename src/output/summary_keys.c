@@ -12,11 +12,13 @@
 #include "output/impact_report.h"
 #include "case/warning.h"
 #include "contact/raft.h"
+#include "step/splitting.h"
 #include "step/window.h"
 
 typedef bt_summary_view view;
 
-enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_UNDISTURBED, FROM_IMPACTS, N_FROM };
+enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_UNDISTURBED, FROM_IMPACTS, FROM_SPLITTING,
+       N_FROM };
 
 // --- what is no member of a struct -----------------------------------------------------------------------------------
 
@@ -82,6 +84,9 @@ static double largest_panel(const view *v) { return v->s->impacts->largest.panel
 static bool has_window(const view *v) { return v->t->window; }
 static double window_low(const view *v) { return bt_window_low(v->t->window, v->t->undisturbed); }
 static double window_laps(const view *v) { return bt_window_laps(v->t->window); }
+
+static bool has_splitting(const view *v) { return v->t->splitting; }
+static double n_splits(const view *v) { return (double)v->t->splitting->n; }
 
 static double n_events(const view *v) { return v->t->events ? (double)v->t->events->n : 0; }
 
@@ -181,6 +186,7 @@ static void write_reasons(bt_json *j, const char *key, const view *v, const void
 #define OF_WINDOW(...) {BT_JSON_AT(FROM_WINDOW, bt_window, __VA_ARGS__)}
 #define OF_UNDISTURBED(...) {BT_JSON_AT(FROM_UNDISTURBED, bt_undisturbed, __VA_ARGS__)}
 #define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
+#define OF_SPLITTING(...) {BT_JSON_AT(FROM_SPLITTING, bt_split_totals, __VA_ARGS__)}
 #define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
 #define PHASE(name, text) MACHINE("phases_s." #name, phases.name, "s", "wall time of " text),
 #define SHARED(name, text) MACHINE("shared_s." #name, shared.name, "s", "wall time that threads shared of " text),
@@ -410,6 +416,25 @@ static const bt_json_key rows[] = {
     OF_WINDOW("moving_window.brought_momentum_y_n_s", brought[1], "N s",
         "momentum of the renewed floes as they entered, y"),
     OF_WINDOW("moving_window.brought_energy_j", brought[2], "J", "kinetic energy of the renewed floes as they entered"),
+    GROUP("splitting", has_splitting, "floes that split"),
+    COUNT("splitting.splits", n_splits, "1", "splits, each of a floe into two pieces"),
+    OF_SPLITTING("splitting.near", by_mode[BT_SPLIT_NEAR], "1", "of them opened at a load"),
+    OF_SPLITTING("splitting.far", by_mode[BT_SPLIT_FAR], "1", "of them bent"),
+    OF_SPLITTING("splitting.burst", by_mode[BT_SPLIT_BURST], "1", "of them burst by a load along the crack"),
+    OF_SPLITTING("splitting.steps", steps, "1", "steps with a split"),
+    OF_SPLITTING("splitting.crack_length_m", crack_length, "m", "length of all cracks"),
+    OF_SPLITTING("splitting.fracture_work_j", work, "J",
+        "work of fracture, which is not taken from the motion: toughness squared / modulus, times the cracks' areas"),
+    OF_SPLITTING("splitting.deferred", deferred, "1",
+        "floes that were left to the next step after the last round, in all steps: their load may be too high"),
+    OF_SPLITTING("splitting.refused_size", too_small, "1",
+        "floes, in all steps, whose pieces would have been too small or too slender"),
+    OF_SPLITTING("splitting.refused_generation", too_old, "1", "floes, in all steps, of the last generation"),
+    OF_SPLITTING("splitting.refused_rafted", rafted, "1", "floes, in all steps, that lay over or under others"),
+    OF_SPLITTING("splitting.refused_reserve", no_id, "1", "floes, in all steps, when no ids were left"),
+    OF_SPLITTING("splitting.unconverged_steps", unconverged, "1", "steps that did not converge, and so split nothing"),
+    OF_SPLITTING("splitting.largest_refused_ratio", largest_refused, "1",
+        "largest stress over strength of a floe that could not split"),
     MACHINE_SUMMARY("ns_per_floe_step", ns_per_floe_step, "ns", "wall time for each floe and step"),
     GROUP("phases_s", NULL, "wall time by phase of the step"),
     BT_WALL_PHASES(PHASE)
@@ -468,7 +493,8 @@ const int bt_n_reported_keys = sizeof bt_reported_keys / sizeof *bt_reported_key
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n)
 {
     const view v = {s, h, c, t, n};
-    const void *const source[N_FROM] = {s, h, t, c, t->window, t->undisturbed, s->impacts};
+    const void *const source[N_FROM] = {s, h, t, c, t->window, t->undisturbed, s->impacts,
+                                        t->splitting ? &t->splitting->total : NULL};
     bt_json j = {0};
     bt_json_open(&j, NULL, '{');
     int n_keys;

@@ -11,6 +11,7 @@
 #include "output/impact_report.h"
 #include "output/summary.h"
 #include "output/summary_window.h"
+#include "step/splitting.h"
 #include "case/case_derived.h"
 #include "case/warning.h"
 
@@ -143,6 +144,17 @@ static void print_forces(const bt_summary *s, const bt_case *c)
                c->reference.source ? c->reference.source : "no source given", s->reference_ratio);
 }
 
+static void print_splits(const bt_splitting *p)
+{
+    const bt_split_totals *t = &p->total;
+    printf("  splits              %lld: %lld at a load, %lld bent, %lld burst; cracks of %.4g m, fracture work %.4g J\n",
+           (long long)p->n, (long long)t->by_mode[BT_SPLIT_NEAR], (long long)t->by_mode[BT_SPLIT_FAR],
+           (long long)t->by_mode[BT_SPLIT_BURST], t->crack_length, t->work);
+    printf("    could not split   %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",
+           (long long)t->too_small, (long long)t->too_old, (long long)t->rafted, (long long)t->no_id,
+           (long long)t->deferred);
+}
+
 void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
                       bt_idx n_floes)
 {
@@ -188,6 +200,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
         if (line) fputs(line, stdout);
         free(line);
     }
+    if (t->splitting) print_splits(t->splitting);
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);

@@ -430,6 +430,7 @@ static void total_up(run *r)
     r->totals.state_hash = bt_world_hash(r->w);
     r->totals.window = r->w->window;
     r->totals.undisturbed = r->w->undisturbed;
+    r->totals.splitting = r->w->splitting;
     note_division(r);
 }
 
