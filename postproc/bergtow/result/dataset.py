@@ -145,7 +145,7 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
 
 #: groups of result.h5, and how the names of their variables begin
 _GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "collision_", "panels": "panel_",
-           "events": "event_"}
+           "events": "event_", "splits": "split_", "pieces": "piece_"}
 #: dimensions by their scales in the file
 _DIMENSIONS = {"/series/time": "time", "/sample": "time", "/frames/time": "frame", "/impacts/time": "collision",
                "/events/time": "event", "/body": "other_body", "/body_end": "other_body_end",
@@ -212,6 +212,9 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames[name].shape[1]))):
                 dims = ("frame", of, "xy")[:frames[name].ndim]
                 put(f"{of}_{name}", dims, frames[name], None, part, long_name=meanings[name])
+        for name in frames:  # of pieces of floes that split, frame after frame
+            if name.startswith("piece"):
+                put(f"frame_{name}", _dims(frames[name]), frames[name])
         if "line_points" in frames:
             put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
             put("branch_tension", ("frame", "branch"), frames["line_tension"])

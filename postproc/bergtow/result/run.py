@@ -491,15 +491,41 @@ class Run:
             return vertices, offsets
         return self._once(("outlines", group), read)
 
+    def _floes(self):
+        """Outlines of the floes and of the pieces of floes that split, which are floes like any other."""
+        vertices, offsets = self._outlines("floes")
+        if not self.n_pieces:
+            return vertices, offsets
+        def joined():
+            more, ends = self._outlines("pieces")
+            return np.concatenate([vertices, more]), np.concatenate([offsets, offsets[-1] + ends[1:]])
+        return self._once("floes", joined)
+
+    @property
+    def n_pieces(self):
+        """Pieces of floes that split: the last so many of the floes. Poses and forces of a floe are NaN in frames in
+        which it is not there: before it was a piece, or after it has split."""
+        return self._once("pieces", lambda: len(self._file["pieces/area"]) if "pieces" in self._file else 0)
+
+    @property
+    def splits(self):
+        """Floes that split: dict of columns [S], "time" s, "parent", "generation", "mode", "ratio", "thickness" m, and
+        "crack" [S, 4] m, x and y of its ends; empty where floes do not split. Split k made the floes
+        n_floes - n_pieces + 2 k and the one after it."""
+        group = self._file.get("splits")
+        if group is None:
+            return {}
+        return self._once("splits", lambda: {name: self._read(f"splits/{name}") for name in group})
+
     @property
     def vertices(self):
         """[V, 2] m, outlines of all floes one after the other, body frame."""
-        return self._outlines("floes")[0]
+        return self._floes()[0]
 
     @property
     def offsets(self):
         """[N+1], floe i owns vertices[offsets[i]:offsets[i+1]]."""
-        return self._outlines("floes")[1]
+        return self._floes()[1]
 
     @property
     def n_floes(self):
@@ -508,12 +534,18 @@ class Run:
     @property
     def thickness(self):
         """[N] m."""
-        return self._once("thickness", lambda: self._read("floes/thickness", ndim=1))
+        def read():
+            own = self._read("floes/thickness", ndim=1)
+            return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
+        return self._once("thickness", read)
 
     @property
     def area(self):
         """[N] m²."""
-        return self._once("area", lambda: self._read("floes/area", ndim=1))
+        def read():
+            own = self._read("floes/area", ndim=1)
+            return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
+        return self._once("area", read)
 
     @property
     def bodies(self):
@@ -595,9 +627,23 @@ class Run:
                            "the file is damaged: run the case again")
         return data
 
+    def _of_floes(self, name, frame, others=0):
+        """[N, ...] of the floes in a frame; others: bodies that follow the floes in the file."""
+        own = self.n_floes - self.n_pieces
+        data = self._frame(name, frame, own + others)[:own]
+        if not self.n_pieces:
+            return data
+        ends = self._once("piece_end", lambda: self._read("frames/piece_end", ndim=1))
+        k = frame % self.n_frames
+        rows = slice(int(ends[k - 1]) if k else 0, int(ends[k]))
+        out = np.full((self.n_floes, *data.shape[1:]), np.nan)
+        out[:own] = data
+        out[own + self._file["frames/piece"][rows]] = self._file[f"frames/piece_{name}"][rows]
+        return out
+
     def pose(self, frame):
-        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped)."""
-        return self._frame("pose", frame, self.n_floes)
+        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN of one that is not there."""
+        return self._of_floes("pose", frame)
 
     def body_pose(self, frame):
         """[B, 3] x m, y m, yaw rad of the bodies, as written."""
@@ -605,20 +651,21 @@ class Run:
 
     def contact_force(self, frame):
         """[N] N, largest normal contact force on each floe in the step of the frame; NaN where that has no solution."""
-        return self._frame("contact_force", frame, self.n_floes)
+        return self._of_floes("contact_force", frame)
 
     def least_contact_force(self, frame):
         """The same for pictures: that of the last frame before whose step has a solution stands in for NaN, 0 at the
         start, as in series."""
         for k in range(frame % max(1, self.n_frames), -1, -1):
             force = self.contact_force(k)
-            if not np.isnan(force).any():
-                return force
+            there = np.isfinite(self.pose(k)[:, 0]) if self.n_pieces else np.ones(len(force), bool)
+            if not np.isnan(force[there]).any():
+                return np.where(there, force, 0)
         return np.zeros(self.n_floes)
 
     def speed(self, frame):
         """[N] m/s, speed of each floe."""
-        return self._frame("speed", frame, self.n_floes + len(self.bodies))[:self.n_floes]
+        return self._of_floes("speed", frame, len(self.bodies))
 
     def wrap(self, xy, centre=None):
         """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).
