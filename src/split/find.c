@@ -15,7 +15,7 @@
 //     burst          t/σ_1.4
 // The three peak at different places, so that the largest of the ratios counts, not their sum.
 //
-// Sections that are looked at: from each of the largest contacts (up to 8, of a tenth of the largest load or more) along
+// Sections that are looked at: from each of the largest contacts (up to 8, of a tenth of the largest load on) along
 // its force, through the centroid, and to each other of them; through the centroid across the most tensile axis of
 // Σ sym(x f); and across the long axis of the floe at its centroid and at a third and two thirds of its length: a strip
 // that is struck at its end breaks at a third. No section is shorter than the least width. A convex floe in two pieces,
