@@ -49,6 +49,11 @@ FREE = {
     "ice.restitution": (1e-2, 1, "lm"),
     "ice.crushing.least_length": (1e-2, 10, "lm"),
     "ice.rafting.kappa": (2, 30, "l"),
+    "ice.splitting.strength": (1e4, 1e6, "m"),
+    "ice.splitting.generations": (1, 8, "lm"),
+    "ice.splitting.aspect": (2, 10, "lm"),
+    "ice.splitting.reserve": (1, 1000, "l"),
+    "ice.splitting.scatter": (2, 30, "lm"),
     "ice.added_mass": (1e-2, 1, "lm"),
     "ice.added_inertia": (1e-2, 1, "lm"),
     "ice.drag.water_form": (0.01, 10, "lm"),
@@ -111,7 +116,8 @@ run.dt run.duration domain.frame domain.length domain.width domain.x0 domain.y0 
 domain.ends_closing domain.sides_closing domain.ahead ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max
 ice.extent.x_min ice.extent.x_max ice.extent.y_min ice.extent.y_max
 ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max ice.size_exponent
-ice.thickness ice.thickness_law ice.crushing.pressure ice.start body.shape body.length body.width body.vertices body.x
+ice.thickness ice.thickness_law ice.crushing.pressure
+ice.splitting.toughness ice.splitting.least_size ice.start body.shape body.length body.width body.vertices body.x
 body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
 tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
 tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y
@@ -507,6 +513,9 @@ def idle(values):
         yield "ice.thickness_spread"
     if "ice.crushing.pressure" not in values:
         yield "ice.crushing.least_length"
+    if "ice.splitting.toughness" not in values:
+        yield from ("ice.splitting.strength", "ice.splitting.generations", "ice.splitting.aspect",
+                    "ice.splitting.reserve", "ice.splitting.scatter")
     if "water.tide.major" not in values:
         yield from ("water.tide.inclination", "water.tide.phase")
     conversion = values.get("impact.conversion", "duration")

@@ -118,6 +118,15 @@ typedef struct bt_case {
         double crushing_pressure;       ///< Pa; 0 = rigid contact
         double crushing_least;          ///< least contact length / thickness
         double rafting_kappa;           ///< κ of the line load under which floes raft; 0 = they do not
+        struct {
+            double toughness;           ///< K, Pa √m; 0 = floes do not split
+            double strength;            ///< σ_t of ice without a crack, Pa
+            double least_size;          ///< least width of a piece, m
+            int64_t generations;        ///< how often a floe and its pieces may split
+            double aspect;              ///< largest length / width of a piece
+            int64_t reserve;            ///< pieces that may be added in all; 0 = twice the floes
+            double scatter;             ///< Weibull modulus of the strength; 0 = the same for all
+        } splitting;
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;

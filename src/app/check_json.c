@@ -25,13 +25,17 @@ static void write_domain(bt_json *j, const bt_case *c, const bt_check_ice *n)
     bt_json_close(j, '}');
 }
 
-static void write_ice(bt_json *j, const bt_check_ice *n)
+static void write_ice(bt_json *j, const bt_case *c, const bt_check_ice *n)
 {
+    const bool splits = n->count >= 1 && c->ice.splitting.toughness > 0;
+    const bt_check_split s = splits ? bt_check_split_of(c, n) : (bt_check_split){NAN, NAN};
     bt_json_open(j, "ice", '{');
     bt_json_number(j, "floes", round(n->count));
     bt_json_number(j, "concentration", n->concentration);
     bt_json_number(j, "mean_size_m", n->count < 1 ? NAN : n->size);
     bt_json_number(j, "mean_thickness_m", n->count < 1 ? NAN : n->thickness);
+    bt_json_number(j, "split_three_point_n", s.three_point);
+    bt_json_number(j, "split_opening_n", s.opening);
     bt_json_close(j, '}');
 }
 
@@ -70,7 +74,7 @@ void bt_check_print_json(const char *path, const bt_case *c, const bt_comm *comm
     bt_json_string(&j, "title", c->run.title);
     bt_warnings_json(&j, "warnings", warnings);
     write_domain(&j, c, n);
-    write_ice(&j, n);
+    write_ice(&j, c, n);
     write_run(&j, c, run);
     bt_check_write_defaults(&j, c);
     write_cost(&j, c, comm, run);

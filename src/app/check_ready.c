@@ -16,6 +16,7 @@
 #include "estimate/packing.h"
 #include "output/summary_window.h"
 #include "base/elementary.h"
+#include "split/law.h"
 
 static bt_check_ice ice_of_case(const bt_case *c)
 {
@@ -115,6 +116,14 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
                       "solver.reference_speed: %.3g m/s, and the ice comes at up to %.3g m/s: contacts are solved more "
                       "strictly than a result needs, and slower hits count as collisions; set it to that",
                       reference, s.speed);
+}
+
+bt_check_split bt_check_split_of(const bt_case *c, const bt_check_ice *n)
+{
+    const bt_split_law law = {.toughness = c->ice.splitting.toughness, .strength = c->ice.splitting.strength};
+    const double side = sqrt(BT_PI / 4) * n->size;
+    return (bt_check_split){bt_split_three_point_load(&law, n->thickness, side),
+                            bt_split_opening_load(&law, n->thickness, side)};
 }
 
 /// Where the tow leads in the ice, which water and wind move; a lead goes with it.

@@ -36,6 +36,9 @@ void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, b
 /// Of a time step in the printed list.
 static inline const char *bt_check_verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
 bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n);
+/// Loads that split the mean floe, as a square of its area (split/law.h), N.
+typedef struct bt_check_split { double three_point, opening; } bt_check_split;
+bt_check_split bt_check_split_of(const bt_case *c, const bt_check_ice *n);
 /// Rough estimate of a run, s of one core.
 double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
 

@@ -36,6 +36,9 @@ static const bt_unit_entry units[] = {
     {"kN*s/m", BT_UNIT_DAMPING, 1e3, 1},
     {"Pa", BT_UNIT_PRESSURE, 1, 1}, {"kPa", BT_UNIT_PRESSURE, 1e3, 1}, {"MPa", BT_UNIT_PRESSURE, 1e6, 1},
     {"N/m", BT_UNIT_LINE_LOAD, 1, 1}, {"kN/m", BT_UNIT_LINE_LOAD, 1e3, 1}, {"MN/m", BT_UNIT_LINE_LOAD, 1e6, 1},
+    {"Pa m^0.5", BT_UNIT_TOUGHNESS, 1, 1}, {"kPa m^0.5", BT_UNIT_TOUGHNESS, 1e3, 1},
+    {"MPa m^0.5", BT_UNIT_TOUGHNESS, 1e6, 1}, {"kPa√m", BT_UNIT_TOUGHNESS, 1e3, 1},
+    {"MPa√m", BT_UNIT_TOUGHNESS, 1e6, 1},
 };
 enum { N_UNITS = sizeof units / sizeof *units };
 
@@ -65,6 +68,7 @@ static const struct {
     [BT_UNIT_DAMPING] = {"a damping", "N s/m", "N s/m", 2.5},
     [BT_UNIT_PRESSURE] = {"a pressure", "Pa", "Pa", 1},
     [BT_UNIT_LINE_LOAD] = {"a force per length", "N/m", "N/m", 2},
+    [BT_UNIT_TOUGHNESS] = {"a fracture toughness", "Pa m^0.5", "Pa m^0.5", 1.5},
 };
 
 double bt_units_froude(bt_unit kind) { return kinds[kind].froude; }

@@ -20,6 +20,7 @@ typedef enum {
     BT_UNIT_DAMPING,  ///< N s/m
     BT_UNIT_PRESSURE, ///< Pa
     BT_UNIT_LINE_LOAD, ///< N/m
+    BT_UNIT_TOUGHNESS, ///< Pa m^0.5
     BT_UNIT_KINDS
 } bt_unit;
 

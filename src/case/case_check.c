@@ -269,6 +269,42 @@ static void check_sizes(const check *k)
                        BT_MOST_FLOES);
 }
 
+static void check_splitting(const check *k)
+{
+    const bt_case *c = k->c;
+    if (!bt_check_sound(k, "ice.splitting.toughness")) return;
+    if (bt_check_given(k, "ice.splitting.strength") && !bt_check_given(k, "ice.splitting.toughness"))
+        bt_check_fault(k, "ice.splitting.strength",
+                       "is given without ice.splitting.toughness, so that no floe splits; give that, too, as in 150 kPa "
+                       "m^0.5, or remove the key");
+    if (!(c->ice.splitting.toughness > 0)) return;
+    if (bt_check_sound(k, "domain.ends") && c->domain.ends == BT_BOUND_MOVING)
+        bt_check_fault(k, "ice.splitting.toughness",
+                       "floes that split are not supported with domain.ends: moving, where a floe that is left behind "
+                       "comes back ahead; set 0, or take another boundary and a domain as long as the tow");
+    if (bt_check_sound(k, "ice.splitting.scatter") && c->ice.splitting.scatter > 0 && c->ice.splitting.scatter < 2)
+        bt_check_fault(k, "ice.splitting.scatter",
+                       "a Weibull modulus of %g leaves floes without strength; give at least 2, as in 10, or 0 for the "
+                       "same strength everywhere",
+                       c->ice.splitting.scatter);
+    if (!bt_check_sound(k, "ice.splitting.least_size ice.thickness")) return;
+    const double least = c->ice.splitting.least_size;
+    if (isnan(least)) {
+        bt_check_fault(k, "ice.splitting.least_size",
+                       "has no default where ice.thickness is none; give the least width of a piece, as in 2 m");
+        return;
+    }
+    if (bt_case_reads_field(c) || c->ice.concentration == 0) return;
+    if (!bt_check_sound(k, "ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent")) return;
+    const bool power = c->ice.size_law == BT_SIZE_POWER;
+    const double largest = power ? c->ice.size_max : c->ice.size;
+    if (largest > 0 && !(least < largest))
+        bt_check_fault(k, "ice.splitting.least_size",
+                       "%g m is not below %s, %g m, so that no floe can split; give a smaller one, or "
+                       "ice.splitting.toughness: 0",
+                       least, power ? "ice.size_max" : "ice.size", largest);
+}
+
 static void check_outlines(const check *k)
 {
     const bt_case *c = k->c;
@@ -558,6 +594,7 @@ bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
     check_region(&k);
     check_extent(&k);
     check_sizes(&k);
+    check_splitting(&k);
     check_outlines(&k);
     bt_case_check_idle(&k);
     double v[2 * BT_MAX_VERTICES];

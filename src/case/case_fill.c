@@ -35,6 +35,8 @@ void bt_case_fill_scene(bt_case *c)
     bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
     bt_check_fill(&c->body.friction, c->ice.friction);
     bt_check_fill(&c->body.restitution, c->ice.restitution);
+    // A thickness that every floe has for itself, NaN, leaves what the frame says.
+    bt_check_fill(&c->ice.splitting.least_size, basin ? 3 * c->ice.thickness : bt_max(3 * c->ice.thickness, 2));
 }
 
 void bt_case_fill_impact(bt_case *c)

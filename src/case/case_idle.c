@@ -27,7 +27,7 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { RULES = 25 };
+enum { RULES = 26 };
 
 static void list(const bt_case *c, idle out[RULES])
 {
@@ -62,6 +62,10 @@ static void list(const bt_case *c, idle out[RULES])
          "ice.shape", "on floes of this ice.shape"},
         {!(c->ice.crushing_pressure > 0), "ice.crushing.least_length", "ice.crushing.pressure",
          "on ice that is not crushed (ice.crushing.pressure)"},
+        {!(c->ice.splitting.toughness > 0),
+         "ice.splitting.strength ice.splitting.least_size ice.splitting.generations ice.splitting.aspect "
+         "ice.splitting.reserve ice.splitting.scatter",
+         "ice.splitting.toughness", "on floes that do not split (ice.splitting.toughness)"},
         {c->body.shape == BT_BODY_POLYGON, "body.length body.width", "body.shape",
          "on the waterline of body.vertices (body.shape: polygon)"},
         {c->body.shape == BT_BODY_ABSENT,

@@ -159,7 +159,8 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
     char *head = bt_text_of(
         "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn "
         "1/sqrt(L); masses,\n"
-        "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles "
+        "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; fracture toughness "
+        "L^(3/2); densities, angles "
         "and ratios as they were.\n"
         "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full "
         "scale:\n"

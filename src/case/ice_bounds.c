@@ -182,8 +182,15 @@ void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings)
 
 static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice is seldom so thick, assumed
 
+static const double THIN = 0.1; // m, at full scale, assumed
+
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings)
 {
+    if (c->ice.splitting.toughness > 0 && thickness < THIN && c->domain.frame == BT_FRAME_GEOGRAPHIC)
+        bt_warn(warnings, BT_WARN_THIN_SPLITS,
+                "ice.splitting.toughness: the ice is %.3g m thick in the mean, and floes of less than 0.1 m raft or "
+                "bend before they split; set ice.rafting.kappa, or 0 here",
+                thickness);
     const bool deep = c->body.shape != BT_BODY_ABSENT && thickness > c->body.draft;
     if (!(thickness > THICK) && !(thickness > STOUT * size) && !deep) return;
     bt_warn(warnings, BT_WARN_THICK_ICE,

@@ -162,6 +162,24 @@ bt_key bt_case_keys[] = {
          "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = without loss. Work / potential energy gained is "
          "half of it: the ratio of 17 for pressure ridges [Flato & Hibler 1995] is 34, those of 5 to 17 are 10 to 34; "
          "which holds for rafting is assumed"),
+    REAL("ice.splitting.toughness", ice.splitting.toughness, TOUGHNESS, "0 Pa m^0.5", "[0, 1e9]",
+         "fracture toughness K of the ice, under which floes split along straight lines; 0 = they never do. At full "
+         "scale 150 kPa m^0.5, in the literature 50 to 250, not calibrated"),
+    REAL("ice.splitting.strength", ice.splitting.strength, PRESSURE, "300 kPa", "(0, 1e9]",
+         "tensile strength of ice without a crack, which limits that of short sections; in the literature 200 to 500 "
+         "kPa, not calibrated"),
+    REAL("ice.splitting.least_size", ice.splitting.least_size, LENGTH,
+         "= 3 ice.thickness, in the geographic frame at least 2 m", "(0, 1e5]",
+         "least width of a piece: a floe does not split where one would be narrower, assumed"),
+    INT("ice.splitting.generations", ice.splitting.generations, "5", "[1, 60]",
+        "how often in a row a floe and its pieces may split, assumed"),
+    REAL("ice.splitting.aspect", ice.splitting.aspect, RATIO, "6", "[1, 1000]",
+         "largest length / width of a piece, unless the floe that splits has more, assumed"),
+    INT("ice.splitting.reserve", ice.splitting.reserve, "0", "[0, 2e7]",
+        "pieces that may be added in the whole run, after which no floe splits any more; 0 = twice the floes"),
+    REAL("ice.splitting.scatter", ice.splitting.scatter, NONE, "0", "[0, 1000]",
+         "Weibull modulus of the strength of floes about its median, that of ice.splitting: as in 10, assumed; 0 = all "
+         "the same"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]",
          "added moment of inertia of a floe / its own, assumed"),

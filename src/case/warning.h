@@ -84,6 +84,7 @@
     ROW(CLOSED_ICE, "closed_ice", "boundary concentration packed", "the walls close until the ice is packed")          \
     ROW(SLOW_CLOSING, "slow_closing", "boundary speed_m_s floes share_m_s accepted_m_s tolerance",                     \
         "the walls close more slowly than the tolerance tells")                                                        \
+    ROW(THIN_SPLITS, "thin_splits", "thickness_m", "floes that would raft or bend may split")                          \
     ROW(THICK_ICE, "thick_ice", "thickness_m", "the ice is thicker than is likely")                                    \
     ROW(OWN_WAKE, "own_wake", "time_s", "the body meets ice that it has opened before")                                \
     ROW(LEAVES_ICE, "leaves_ice", "time_s", "the body leaves the ice")                                                 \

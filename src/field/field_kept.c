@@ -24,8 +24,9 @@
 /// Keys of these sections on which no ice that is made or read depends.
 static const char *const idle[] = {
     "ice.added_mass", "ice.added_inertia", "ice.crushing.", "ice.density", "ice.drag.", "ice.friction", "ice.rafting.",
-    "ice.restitution", "ice.start", "domain.wall_", "body.added_", "body.density", "body.draft", "body.drag.",
-    "body.friction", "body.mass", "body.restitution", "body.sail", "body.vx", "body.vy", "body.yaw_rate"};
+    "ice.restitution", "ice.splitting.", "ice.start", "domain.wall_", "body.added_", "body.density", "body.draft",
+    "body.drag.", "body.friction", "body.mass", "body.restitution", "body.sail", "body.vx", "body.vy",
+    "body.yaw_rate"};
 static const char *const sections[] = {"ice.", "domain.", "body."};
 
 static bool begins(const char *name, const char *const *with, size_t n)

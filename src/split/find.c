@@ -2,40 +2,40 @@
 // The section along which a floe splits.
 //
 // Demand of a section, with N and M of section.h, h the thickness and l the length. At each end of it
-//     s = (N -+ 6 M/l - 0.45 f_i)/(h l) = p + e,   - at a, + at b
-// p = 4 F_y/(h l) of the pair that opens it there; f_i is the thrust at the other end that the floe's inertia balances: a
-// point load that goes through the depth of a beam relieves the far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to 4
-// times l, by finite elements. Across the section, with f_t the thrust of the contacts at an end along it, f_i its part
-// that inertia balances (the rest is held behind), and w the length they bear on,
-//     t = (0.637 (1 - W^1.5)(f_t - f_i) + 0.43 (1 - W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
-// 0.637 = 2/pi is that of a disc between two points; both by finite elements. The strength of law.h with c = 0.75 belongs
-// to a pair at the mouth of the crack, and to what closes it there:
-//     near   p > 0:  (p + min(e, 0))/sigma_0.75 + max(e, 0)/sigma_1.4
-//     far    p = 0:  e/sigma_1.4
-//     burst          t/sigma_1.4
+//     s = (N ∓ 6 M/l − 0.45 f_i)/(h l) = p + e,   − at a, + at b
+// p = 4 F_y/(h l) of the pair that opens it there; f_i is the thrust at the other end that the floe's inertia balances:
+// a point load that goes through the depth of a beam relieves the far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to
+// 4 times l, by finite elements. Across the section, with f_t the thrust of the contacts at an end along it, f_i its
+// part that inertia balances (the rest is held behind), and w the length they bear on,
+//     t = (0.637 (1 − W^{3/2})(f_t − f_i) + 0.43 (1 − W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
+// 0.637 = 2/π is that of a disc between two points; both by finite elements. The strength of law.h with c = 0.75
+// belongs to a pair at the mouth of the crack, and to what closes it there:
+//     near   p > 0:  (p + min(e, 0))/σ_0.75 + max(e, 0)/σ_1.4
+//     far    p = 0:  e/σ_1.4
+//     burst          t/σ_1.4
 // The three peak at different places, so that the largest of the ratios counts, not their sum.
 //
-// Sections that are looked at: from each of the largest contacts (up to
-// 8 with a tenth of the largest load or more) along its force, through the centroid, and to each
-// other of them; through the centroid across the most tensile axis of sum sym(x f); and across the long axis of the
-// floe at its centroid and at a third and two thirds of its length: a strip that is struck at its end breaks at a third.
-// A corner of which less than the least width would break off is not looked at: no section is shorter than that. A
-// convex floe in two pieces, each nowhere narrower than that, has no shorter one: one of them has no chord parallel to
-// the section longer than it, and the width of a convex body is at most its longest chord of any direction.
+// Sections that are looked at: from each of the largest contacts (up to 8, of a tenth of the largest load on) along
+// its force, through the centroid, and to each other of them; through the centroid across the most tensile axis of
+// Σ sym(x f); and across the long axis of the floe at its centroid and at a third and two thirds of its length: a strip
+// that is struck at its end breaks at a third. No section is shorter than the least width. A convex floe in two pieces,
+// each nowhere narrower than that, has none: one of them has no chord parallel to the section longer than it, and the
+// width of a convex body is at most its longest chord of any direction.
 //
-// Quick reject. With G = sum |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
+// Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
 // D = 2 R, and loads on the outline:
-//     |N| <= G + |T| sqrt(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
-//         |S1| = |S2|, so each is at most half of int r dA <= sqrt(A J).
-//     |M| <= D G + |T| (1 + R sqrt(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
+//     |N| ≤ G + |T| √(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
+//         |S1| = |S2|, so each is at most half of ∫ r dA ≤ √(A J).
+//     |M| ≤ D G + |T| (1 + R √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
 //         D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
-// A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and l < 2 r,
-// the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines from its
-// ends through those of the section meet beyond it: the part lies in their triangle, no wider than d = D l/(2 r - l).
-//     |M| <= d (2 G + |T| R A/J)
-// Pairs add p <= 4 P/(h l) at their own end and press on the other.
-// Both bounds over l and l^2 fall with l, and the second is above the first from l = r on; so a bound at the least length
-// is one for all.
+// A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and
+// l < 2 r, the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines
+// from its ends through those of the section meet beyond it: the part lies in their triangle, no wider than
+// d = D l/(2 r − l).
+//     |M| ≤ d (2 G + |T| R A/J)
+// Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
+// Both bounds over l and l² fall with l, and the second is above the first from l = r on; so a bound at the least
+// length is one for all.
 #include "split/find.h"
 #include "base/elementary.h"
 
@@ -223,7 +223,7 @@ static void consider_through(const search *s, double x, double y, double dx, dou
     if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c, false);
 }
 
-/// Unit vector of the larger eigenvalue of a symmetric 2 x 2 matrix; false when both are equal to a part `tiny` of scale.
+/// Unit vector of the larger eigenvalue of a symmetric 2 × 2 matrix; false when both differ by less than 2 tiny.
 static bool major_axis(double xx, double xy, double yy, double tiny, double *x, double *y)
 {
     const double half = (xx - yy) / 2, r = bt_hypot(half, xy);
@@ -243,8 +243,9 @@ static void search_sections(const search *s)
 {
     const bt_load_case *w = s->loads;
     const bt_split_floe *f = s->floe;
-    // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two are equal.
-    int chosen[BT_SPLIT_CONTACTS], n = 0;
+    // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two
+    // are equal.
+    int chosen[BT_SPLIT_CONTACTS] = {0}, n = 0;
     double largest = 0;
     for (int k = 0; k < w->n; k++)
         if (bt_load_acts(w, k)) largest = bt_max(largest, load_size(w, k));

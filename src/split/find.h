@@ -30,9 +30,9 @@ typedef struct bt_split {
     double refused_ratio;     ///< its ratio, above 1; 0 = none
 } bt_split;
 
-/// The section of a floe with the largest ratio of stress to strength above 1, of those the law allows; false when there
-/// is none. The loads are put into the order of (other, part, point): their order has no effect. Among sections whose
-/// ratios agree to 1e-9 the first one counts. thread-safe.
+/// The section of a floe with the largest ratio of stress to strength above 1, of those the law allows; false when
+/// there is none. The loads are put into the order of (other, part, point): their order has no effect. Among sections
+/// whose ratios agree to 1e-9 the first one counts. Safe in threads.
 bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best);
 
 /// Upper bound of the ratio of every section of this length or longer, m, whichever the loads (find.c).

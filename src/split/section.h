@@ -2,18 +2,18 @@
 // A section through a floe: a chord of its outline, and what it has to carry.
 //
 // A rigid floe under contact forces f_k at x_k moves so that its inertia balances them, whatever its material. With the
-// centroid at the origin, F = sum f_k, T = sum x_k x f_k, area A and J = int r^2 dA, a force
-//     q(x) = -F/A - (T/J) k x x
+// centroid at the origin, F = Σ f_k, T = Σ x_k × f_k, area A and J = ∫ r² dA, a force
+//     q(x) = −F/A − (T/J) k × x
 // per area balances the contacts: the share of added mass and inertia cancels, as both are a part of the body's own.
 // (Left out: drag, whose stress is a thousandth of the others'.) A chord from a along the unit vector d, n = d turned
-// left, m its middle, l its length; the part 1 on its left has the area A1, S1 = int x dA and J1 = int r^2 dA, about the
+// left, m its middle, l its length; the part 1 on its left has the area A1, S1 = ∫ x dA and J1 = ∫ r² dA, about the
 // parent's centroid. The part is in balance under its contacts, q and the tractions of the section, hence
-//     Q_b = -F A1/A - (T/J) k x S1
-//     N = (sum_1 f_k + Q_b) . n                                       tension > 0
-//     M = sum_1 (x_k - m) x f_k + S1 x (-F/A) - (T/J) J1 - m x Q_b    opens the end b > 0
-// and with a linear stress over the section N/(h l) - 6 M/(h l^2) at a, N/(h l) + 6 M/(h l^2) at b.
+//     Q_b = −F A1/A − (T/J) k × S1
+//     N = (Σ₁ f_k + Q_b) . n                                       tension > 0
+//     M = Σ₁ (x_k − m) × f_k + S1 × (−F/A) − (T/J) J1 − m × Q_b    opens the end b > 0
+// and with a linear stress over the section N/(h l) − 6 M/(h l²) at a, N/(h l) + 6 M/(h l²) at b.
 //
-// A load on the section counts half to each side. One that acts on a length w is two half loads at +-w/4 along the
+// A load on the section counts half to each side. One that acts on a length w is two half loads at ±w/4 along the
 // edge: for a section at its middle that is exact for an even pressure, F w/8 of bending.
 //
 // An outline need not be convex: a section is the piece of the line inside it that begins at a.
@@ -50,7 +50,7 @@ typedef struct bt_edge_load {
     bt_chord_end place;
     double x, y;              ///< of it, m
     double mean_x, mean_y;    ///< of the parts, m
-    int parts;                ///< 1, or 2 half loads at +-w/4 along the edge
+    int parts;                ///< 1, or 2 half loads at ±w/4 along the edge
     struct {
         double x, y;          ///< m, on the outline
         double position;      ///< edge + t

@@ -181,6 +181,7 @@ static void test_what_is_not_in_the_name_changes_nothing(void **state)
         "run.dt=0.5 s", "run.duration=30 s", "tow.speed=0.4 m/s", "water.latitude=75 deg", "ice.friction=0.1",
         "ice.restitution=0.2", "ice.density=850 kg/m3", "ice.added_mass=0.2", "ice.added_inertia=0.2",
         "ice.drag.water_form=0.3", "ice.drag.sheltering=2", "ice.rafting.kappa=10", "ice.crushing.pressure=100 kPa",
+        "ice.splitting.toughness=150 kPa m^0.5",
         "ice.start=rest", "domain.wall_friction=0.1",
         "domain.wall_restitution=0.1", "body.added_mass=0.3", "body.added_inertia=0.3", "body.density=800 kg/m3",
         "body.draft=21 m", "body.drag.air_form=0.3", "body.friction=0.2", "body.restitution=0.2", "body.sail=2 m",

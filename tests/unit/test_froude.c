@@ -19,11 +19,12 @@ static void exponents_follow_from_the_dimensions(void **state)
     (void)state;
     static const struct {
         const char *symbol;
-        int kg, m, s;
+        double kg, m, s;
     } dimensions[] = {
         {"", 0, 0, 0},       {"m", 0, 1, 0},    {"m/s", 0, 1, -1},  {"s", 0, 0, 1},      {"rad", 0, 0, 0},
         {"rad/s", 0, 0, -1}, {"N", 1, 1, -2},   {"kg", 1, 0, 0},    {"kg/m3", 1, -3, 0}, {"N s/m", 1, 0, -1},
         {"Pa", 1, -1, -2},   {"N/m", 1, 0, -2}, {"kg/m", 1, -1, 0}, {"m2", 0, 2, 0},     {"N/m2", 1, -1, -2},
+        {"Pa m^0.5", 1, -0.5, -2},
     };
     for (int kind = 0; kind < BT_UNIT_KINDS; kind++) {
         bool found = false;
