@@ -619,23 +619,29 @@ static bool check_apart(const bt_case *c, bt_world *w, const bt_roster *r, bt_er
     return false;
 }
 
-/// Ids for two pieces of every floe, twice, unless the case says how many.
+/// Ids for the pieces of floes: each split makes one floe more, of two new ids.
 static bt_gid kept_ids(const bt_case *c, const bt_field *f)
 {
-    if (!getenv("BT_K")) return 0;
-    return 4 * ((bt_gid)f->n + c->n_floes);
+    if (!(c->ice.splitting.toughness > 0)) return 0;
+    const bt_gid more = c->ice.splitting.reserve > 0 ? c->ice.splitting.reserve : 2 * ((bt_gid)f->n + c->n_floes);
+    return 2 * more;
 }
 
 static void create_splitting(const bt_case *c, bt_world *w, const bt_roster *r)
 {
-    if (r->n_kept == 0) return;
+    if (!(c->ice.splitting.toughness > 0)) return;
     bt_splitting *s = w->splitting = bt_alloc(1, sizeof *s);
-    s->law = (bt_split_law){.toughness = atof(getenv("BT_K")), .strength = 300e3, .least_width = atof(getenv("BT_L")), .aspect = 6, .slop = w->par.slop};
-    s->generations = 5;
-    s->first = r->n_free;
-    s->reserve = r->n_kept;
-    s->rule = bt_impact_rule_of(c);
-    s->large = 0.5 * LARGE_RATIO * r->mean_size;
+    *s = (bt_splitting){
+        .law = {.toughness = c->ice.splitting.toughness, .strength = c->ice.splitting.strength,
+                .least_width = c->ice.splitting.least_size, .aspect = c->ice.splitting.aspect, .slop = w->par.slop},
+        .modulus = c->ice.splitting.scatter,
+        .seed = c->ice.seed,
+        .generations = c->ice.splitting.generations,
+        .first = r->n_free,
+        .reserve = r->n_kept,
+        .rule = bt_impact_rule_of(c),
+        .large = 0.5 * LARGE_RATIO * r->mean_size,
+    };
 }
 
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
