@@ -248,7 +248,7 @@ static judged judge(const bt_world *w, bt_idx i, load_row *row, size_t n)
     const bt_bodies *b = &w->bodies;
     judged out = {.floe = i};
     bool rafted = false;
-    bt_floe_load *load = bt_alloc(n, sizeof *load);
+    bt_floe_load few[24], *load = n <= 24 ? few : bt_alloc(n, sizeof *load);
     int n_loads = 0;
     for (size_t k = 0; k < n; k++) {
         if (row[k].load.fx == 0 && row[k].load.fy == 0) rafted = true;
@@ -263,7 +263,7 @@ static judged judge(const bt_world *w, bt_idx i, load_row *row, size_t n)
         f.factor = bt_split_scatter(s->seed, ancestor, path, s->modulus);
     }
     const bool splits = n_loads > 0 && bt_split_find(&f, load, n_loads, &s->law, &out.best);
-    free(load);
+    if (load != few) free(load);
     if (splits) {
         out.verdict = rafted ? RAFTED : bt_splitting_generation(s, gid) >= s->generations ? TOO_OLD : SPLITS;
         if (out.verdict != SPLITS) out.best.refused_ratio = bt_max(out.best.refused_ratio, out.best.ratio);
