@@ -244,13 +244,16 @@ static void test_three_point(void **state)
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, h);
     const bt_split_law law = law_of(3);
-    const bt_floe_load load[3] = {push(-l / 2, 0, 1, 0), push(l / 2, -l / 2, -0.5, 0), push(l / 2, l / 2, -0.5, 0)};
+    bt_floe_load load[3] = {push(-l / 2, 0, 1, 0), push(l / 2, -l / 2, -0.5, 0), push(l / 2, l / 2, -0.5, 0)};
     bt_split best;
     const double force = critical(&s, load, 3, &law, &best);
     assert_near(force, bt_split_three_point_load(&law, h, l), 1e-8);
     assert_near(force, 1.4 * h * K * sqrt(l) / 1.5, 0.01);
     assert_int_equal(best.mode, BT_SPLIT_FAR);
     assert_near(best.length, l, 1e-12);
+    load[0].length = 6; // an even pressure takes F w/8 of the bending
+    const double wide = bt_split_strength(&law, l, false) * h * l / (1.5 - 0.75 * 6 / l);
+    assert_near(critical(&s, load, 3, &law, &best), wide, 1e-8);
 }
 
 // A strip l x b. Struck at its end it bends as F x (1 - x/l)^2, most at a third: 4 F l/27; struck in its middle F l/8.
@@ -647,14 +650,12 @@ static void test_snap(void **state)
     assert_int_equal(piece[1].n, 3);
     assert_true(piece[0].left); // equal halves: the left one first
     assert_false(bt_chord_from(4, f.v, (bt_chord_end){0, 0.5}, 0.2, -1, 0.1, &c)); // outwards
-    // Rounding of turned halves does not say which is the larger.
+    // Rounding of equal halves does not say which is the larger.
     for (int k = 0; k < 50; k++) {
-        double v[8];
-        for (int i = 0; i < 4; i++) {
-            v[2 * i] = cos(k) * f.v[2 * i] - sin(k) * f.v[2 * i + 1];
-            v[2 * i + 1] = sin(k) * f.v[2 * i] + cos(k) * f.v[2 * i + 1];
-        }
-        assert_true(bt_split_cut(4, v, 100, 10000 / 6., &(bt_chord){{0, 0.5}, {2, 0.5}}, piece));
+        double v[12];
+        for (int i = 0; i < 6; i++) v[2 * i] = cos(k + i * BT_PI / 3), v[2 * i + 1] = sin(k + i * BT_PI / 3);
+        const bt_moments m = bt_shape_extent(6, v);
+        assert_true(bt_split_cut(6, v, m.area, m.polar, &(bt_chord){{k % 6, 0}, {(k + 3) % 6, 0}}, piece));
         assert_true(piece[0].left);
     }
 }
