@@ -116,9 +116,8 @@ run.dt run.duration domain.frame domain.length domain.width domain.x0 domain.y0 
 domain.ends_closing domain.sides_closing domain.ahead ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max
 ice.extent.x_min ice.extent.x_max ice.extent.y_min ice.extent.y_max
 ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max ice.size_exponent
-ice.thickness ice.thickness_law ice.crushing.pressure
-ice.splitting.toughness ice.splitting.least_size ice.start body.shape body.length body.width body.vertices body.x
-body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
+ice.thickness ice.thickness_law ice.crushing.pressure ice.splitting.toughness ice.splitting.least_size ice.start
+body.shape body.length body.width body.vertices body.x body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
 tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
 tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y
 tow.branch2.length tow.branch2.stiffness tow.branch2.damping tow.branch2.breaking_load tow.vessel.mass
@@ -303,6 +302,9 @@ class Scene:
         # A quarter of the cases crush: from what gives way at once to what never does.
         if d.chance(0.25):
             v["ice.crushing.pressure"] = d.log(1e2, 1e7)
+        if self.ends != "moving" and d.chance(0.25):
+            v["ice.splitting.toughness"] = d.log(1e1, 1e5)
+            v["ice.splitting.least_size"] = size * d.flat(0.1, 0.38)
 
     def room(self):
         """Way that the body has before a wall, m."""

@@ -273,10 +273,6 @@ static void check_splitting(const check *k)
 {
     const bt_case *c = k->c;
     if (!bt_check_sound(k, "ice.splitting.toughness")) return;
-    if (bt_check_given(k, "ice.splitting.strength") && !bt_check_given(k, "ice.splitting.toughness"))
-        bt_check_fault(k, "ice.splitting.strength",
-                       "is given without ice.splitting.toughness, so that no floe splits; give that, too, as in 150 kPa "
-                       "m^0.5, or remove the key");
     if (!(c->ice.splitting.toughness > 0)) return;
     if (bt_check_sound(k, "domain.ends") && c->domain.ends == BT_BOUND_MOVING)
         bt_check_fault(k, "ice.splitting.toughness",

@@ -366,3 +366,34 @@ def test_rows_of_a_table_that_no_step_sees(tmp_path):
     assert said in call("check", case).stdout
     assert [w for w in run(tmp_path, case, "--steps", 5).warnings if w.startswith(said)]
     assert "rows that change" not in call("check", case, "--set", "run.dt=0.04").stdout
+
+
+# ---- splitting ----
+
+
+def test_what_splits_the_mean_floe(tmp_path):
+    """The loads of the closed forms, the least size that follows from the thickness, and a warning of thin ice."""
+
+    def said(*settings, case=MAP):
+        options = [part for key, value in settings for part in ("--set", f"ice.splitting.{key}={value}")]
+        result = call("check", write_case(tmp_path, case), *options, "--json")
+        assert result.returncode == DONE, result.stderr
+        return json.loads(result.stdout)
+
+    off, tough = said(), ("toughness", "150 kPa m^0.5")
+    assert off["ice"]["split_opening_n"] is None and "ice.splitting.least_size" not in off["by_default"]
+    on = said(tough)
+    side = 40 * np.sqrt(np.pi / 4)
+    for key, c, part in (("split_opening_n", 0.75, 4), ("split_three_point_n", 1.4, 1.5)):
+        short = (c * 150e3 / 300e3)**2 # l0
+        assert on["ice"][key] == pytest.approx(c * 150e3 / np.sqrt(side + short) * side / part, rel=1e-12)
+    assert on["by_default"]["ice.splitting.least_size"] == 3
+    thin = said(tough, case=changed(MAP, ice__thickness=0.05))
+    assert thin["by_default"]["ice.splitting.least_size"] == 2
+    codes = [[w["code"] for w in of["warnings"]] for of in (on, thin)]
+    assert "thin_splits" not in codes[0] and "thin_splits" in codes[1]
+    basin = said(tough, case=changed(MAP, domain={"length": 2000, "width": 1000}, ice__thickness=0.05))
+    assert basin["by_default"]["ice.splitting.least_size"] == pytest.approx(0.15)
+    assert "thin_splits" not in [w["code"] for w in basin["warnings"]]
+    assert "mean floe, as a square, splits under" in call("check", tmp_path / "case.yml", "--set",
+                                                          "ice.splitting.toughness=150 kPa√m").stdout
