@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/path.h"
+#include "bergtow/catenary.h"
 #include "case/warning.h"
 #include "case/rope.h"
 #include "bergtow/shape.h"
@@ -15,6 +16,7 @@
 
 enum { TIMES = 2000 };                 // of a run at which its planned track is looked at
 static const double DAMPING = 0.03;     // of critical, of a line at sea, assumed
+static const double START_PULL = 2;     // of a line with a weight, in its weights, assumed
 static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
@@ -90,19 +92,30 @@ static void hull_at(const bt_case *c, double hx, double hy, double at[2])
     at[1] = c->body.y + sy * hx + cy * hy;
 }
 
+/// Distance of the ends of a branch at the start, m: just taut, without tension. A line with a weight is never without:
+/// it starts with START_PULL times its weight, at which it sags by a sixteenth of its length.
+static double start_span(const bt_case *c, double length, double stiffness)
+{
+    const double w = c->tow.line.weight;
+    return w > 0 && length > 0 && stiffness > 0 ? bt_catenary_span(length, stiffness, w, START_PULL * w * length)
+                                                       : length;
+}
+
 bool bt_case_tow_start(const bt_case *c, double at[2])
 {
     const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     // A line's length ahead of the fastening point: taut, without tension.
     double p[2], q[2];
     hull_at(c, c->tow.hull_x, c->tow.hull_y, p);
-    at[0] = p[0] + c->tow.line_length * ux;
-    at[1] = p[1] + c->tow.line_length * uy;
+    const double length[2] = {start_span(c, c->tow.line_length, c->tow.line_stiffness),
+                              start_span(c, c->tow.branch2.length, c->tow.branch2.stiffness)};
+    at[0] = p[0] + length[0] * ux;
+    at[1] = p[1] + length[0] * uy;
     if (c->tow.line.branches < 2 || !has_line(c)) return true;
     // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are
     // just taut may lie far off the tow's axis, when one point lies ahead of the other.)
     hull_at(c, c->tow.branch2.hull_x, c->tow.branch2.hull_y, q);
-    const double *const hull[2] = {p, q}, length[2] = {c->tow.line_length, c->tow.branch2.length};
+    const double *const hull[2] = {p, q};
     const double mx = 0.5 * (p[0] + q[0]), my = 0.5 * (p[1] + q[1]);
     double ahead = INFINITY;
     for (int k = 0; k < 2; k++) {
