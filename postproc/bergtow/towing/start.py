@@ -64,7 +64,8 @@ def _frequency(stiffness: float, mass: float) -> float:
 
 def swing_after(ramp: float, speed: float, stiffness: float, mass: float) -> float:
     """Amplitude of the tension, N, that a linear ramp of the led end from 0 to this speed leaves behind:
-    m v ω |sin(ωT/2)/(ωT/2)|, which is 0 after whole periods."""
+    m v ω |sin(ωT/2)/(ωT/2)|, which is 0 after whole periods. Where the swing begins downwards the line goes slack, and
+    bears none of it until something has slowed the berg."""
     not_below_zero(ramp=ramp, speed=speed)
     omega = _frequency(stiffness, mass)
     half = 0.5 * omega * ramp
