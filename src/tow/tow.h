@@ -163,7 +163,7 @@ static inline double bt_tow_tension(const bt_tow *t, int k)
 {
     const bt_branch *b = &t->branch[k];
     const double pull = bt_tow_pull(t, k), half = 0.5 * b->weight * b->length0;
-    return b->broken || half == 0 ? pull : sqrt(pull * pull + half * half);
+    return half > 0 && pull > 0 ? sqrt(pull * pull + half * half) : pull; // none of one that has parted
 }
 
 uint64_t bt_tow_hash(const bt_tow *t);

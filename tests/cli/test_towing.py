@@ -79,7 +79,7 @@ def test_numbers_without_a_line_are_refused():
 
 def test_the_simulated_line_is_the_catenary(tmp_path):
     """At every step the pull is the root of the catenary's span, the tension that at the ends; it starts as documented,
-    and its weight is in the resolved case."""
+    and its weight is in the resolved case, and in a run that is resumed."""
     r = run(tmp_path, changed(BERG, run__dt=0.5, run__duration=1200, tow__ramp=300, tow__line={"weight": WEIGHT},
                               body__drag=None), "--quiet")
     span, pull, tension = r.series("line_length", "tow_force", "line_tension")
@@ -91,8 +91,9 @@ def test_the_simulated_line_is_the_catenary(tmp_path):
     assert pull == pytest.approx([root(s) for s in span], rel=1e-7)
     assert tension == pytest.approx(np.hypot(pull, WEIGHT * LENGTH / 2), rel=1e-12)
     assert pull[0] == pytest.approx(2 * WEIGHT * LENGTH, rel=1e-3)
-    again = run(tmp_path, r.dir / "case.resolved.yml", "--quiet", name="again")
-    assert again.hash == r.hash
+    again = run(tmp_path, r.dir / "case.resolved.yml", "--quiet", "--steps", 700, name="again")
+    assert call("resume", again.dir, "--quiet").returncode == 0
+    assert json.loads((again.dir / "summary.json").read_text())["state_hash"] == r.hash
 
 
 def test_a_branch_with_weight_breaks_by_the_tension_at_its_ends(tmp_path):
