@@ -267,8 +267,8 @@ void bt_case_tow_follow(const bt_check *k)
 
 // A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r
 // with that amplitude. A sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and
-// whole periods leave no swing behind. A line with a weight is softest as it starts, where its slack is still to be taken
-// up, and that period is the longest.
+// whole periods leave no swing behind. A line with a weight is softest as it starts, where its slack is still to be
+// taken up, and that period is the longest.
 double bt_case_line_period(const bt_case *c) { return period_on(c, true); }
 
 double bt_case_steepest_ramp(const bt_case *c)

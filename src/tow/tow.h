@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // How the body is towed: prescribed velocity, or one or two elastic lines to an end that follows a path or to a vessel.
 //
-// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs from a point on the hull to the towing
-// end: without a weight straight, T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more unilateral row of
-// the solver, λ = Δt T ≥ 0:
+// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs straight (without a weight, no sag)
+// from a point on the hull to the towing end. T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more
+// unilateral row of the solver, λ = Δt T ≥ 0:
 //     λ_i = max(0, a_i + b_i l̇2_i),   a = Δt k (l1 − L0),  b = Δt (k θ Δt + c),   l̇2 = l̂·(U_end,2 − v_hull,2)
 // (l̂: from hull to end at the start of the step). While l1 + Δt l̇* (at the free velocities) is still below L0, b has
 // no c: a line damps only when it is stretched. With X2 = X1 + Δt U2, θ = 0 is the symplectic Euler scheme: no

@@ -159,7 +159,7 @@ void bt_tow_begin_rows(bt_world *w)
     const end_motion idle = end_of(t, IDLE);
     end_motion free_end = idle; // without the line: as fast as power and governor let it
     if (t->mode == BT_TOW_THRUST) free_end.d = bt_max(idle.d, bt_min(t->vessel.full, t->end_speed));
-    double rate[BT_MAX_BRANCHES];
+    double rate[BT_MAX_BRANCHES] = {0};
     for (int k = 0; k < t->n_branches; k++) {
         bt_branch *b = &t->branch[k];
         b->rx = cosine * b->hull_x - sine * b->hull_y;

@@ -176,7 +176,8 @@ def test_the_start_load_by_its_ramp(tmp_path, mass, share):
     assert tension.max() == pytest.approx(towing.start_load(ramp, 0.5, k, mass), rel=2e-3)
     if math.sin(2 * math.pi * share) > -1e-9:  # else the line goes slack, and the berg, undamped, overtakes its end
         jerk = towing.start_load(0, 0.5, k, mass)
-        assert tension[time > ramp + 0.2].max() == pytest.approx(towing.swing_after(ramp, 0.5, k, mass), abs=5e-3 * jerk)
+        left = towing.swing_after(ramp, 0.5, k, mass)
+        assert tension[time > ramp + 0.2].max() == pytest.approx(left, abs=5e-3 * jerk)
 
 
 def test_the_ramp_of_a_load_is_the_shortest():
@@ -266,7 +267,8 @@ LINES_HEAD = "name,material,diameter_mm,mass_kg_m,density_kg_m3,stiffness_kn,bre
 
 def test_a_table_of_ones_own_adds_and_replaces(tmp_path):
     file = tmp_path / "mine.csv"
-    file.write_text(LINES_HEAD + '# ours\nhmpe-64,HMPE,64,2,975,1e5,2000,"yard, 2026"\nours,wire,50,10,7850,9e4,1500,yard\n')
+    file.write_text(LINES_HEAD + '# ours\nhmpe-64,HMPE,64,2,975,1e5,2000,"yard, 2026"\n'
+                    "ours,wire,50,10,7850,9e4,1500,yard\n")
     lines = towing.lines(file)
     assert lines["hmpe-64"].breaking == 2e6 and towing.find_line("ours", file).source == "yard"
     assert len(lines) == len(towing.lines()) + 1
@@ -280,7 +282,8 @@ def test_a_table_of_ones_own_adds_and_replaces(tmp_path):
 @pytest.mark.parametrize("text, said", [
     ("", ":1: the head is empty"), ("name,mass\n", ":1: the head is name,mass; give name,material"),
     (LINES_HEAD + "a,w,1,1,1,1,1\n", ":2: 7 cells"), (LINES_HEAD + "\na,w,1,1,1,1,1k,s\n", ":3: breaking_kn: '1k'"),
-    (LINES_HEAD + "a,w,-1,1,1,1,1,s\n", ":2: diameter_mm: '-1'"), (LINES_HEAD + "a,w,1,1,1,1,1,\n", ":2: source is empty"),
+    (LINES_HEAD + "a,w,-1,1,1,1,1,s\n", ":2: diameter_mm: '-1'"),
+    (LINES_HEAD + "a,w,1,1,1,1,1,\n", ":2: source is empty"),
     (LINES_HEAD + "a,w,1,1,1,1,1,s\na,w,1,1,1,1,1,s\n", ":3: name: 'a' stands twice")])
 def test_a_table_that_is_wrong_is_refused_with_its_place(tmp_path, text, said):
     file = tmp_path / "mine.csv"

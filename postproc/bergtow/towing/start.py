@@ -2,9 +2,9 @@
 """What a start and a slack line do to the tension, and the ramp that keeps a start below a load.
 
 Two masses on an elastic line move as one, m = a b/(a + b), on a spring, m x'' + k x = S, with x the stretch and S the
-tension that the outer forces hold in the end; a line whose far end is led has the mass of the berg. Without damping, and
-with forces that do not change while the line swings: upper bounds of what a line with damping bears. k = EA/L; of a line
-with weight this is its stiffest. Added mass counts as mass.
+tension that the outer forces hold in the end; a line whose far end is led has the mass of the berg. Without damping,
+and with forces that do not change while the line swings: upper bounds of what a line with damping bears. k = EA/L,
+which a line with weight comes up to as it is pulled straight. Added mass counts as mass.
 """
 from __future__ import annotations
 
