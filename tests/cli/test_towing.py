@@ -180,14 +180,51 @@ def test_the_start_load_by_its_ramp(tmp_path, mass, share):
         assert tension[time > ramp + 0.2].max() == pytest.approx(left, abs=5e-3 * jerk)
 
 
+@pytest.mark.parametrize("held", [0, 5e4, 8e5, 5e6])
+def test_a_start_against_a_resistance(held):
+    """A constant one, by integration: the berg is held until the line pulls as hard. One that grows with the speed to
+    the same value loads the line no more."""
+    k, m, v = EA / LENGTH, 2e8, 0.5
+    period = 2 * math.pi * math.sqrt(m / k)
+
+    def peak(ramp, resistance):
+        t, dt, way, y, u, most = 0.0, period / 4000, 0.0, 0.0, 0.0, 0.0
+        while t < ramp + 2 * period:
+            t += dt
+            way += dt * v * min(1, t / ramp)
+            pull = max(0, k * (way - y))
+            most = max(most, pull)
+            u = max(0, u + dt * (pull - resistance(u)) / m)
+            y += dt * u
+        return most
+
+    for share in (0.02, 0.4, 0.8, 3):
+        bound = towing.start_load(share * period, v, k, m, held)
+        assert bound == pytest.approx(peak(share * period, lambda u: held), rel=3e-3)
+        assert peak(share * period, lambda u: held * (u / v) ** 2) <= bound * 1.003
+
+
+def test_a_start_with_drag_stays_below_that_with_a_constant_resistance(tmp_path, mass):
+    """The simulated berg in water: its drag at the full speed as the resistance."""
+    r = run(tmp_path, changed(BERG, body__drag=None, run__dt=0.5, run__duration=1500, tow__ramp=150), "--quiet")
+    tension, drag, speed = r.series("line_tension", "drag_force", "speed_through_water")
+    full = drag[-1] * (0.5 / speed[-1]) ** 2
+    bound = towing.start_load(150, 0.5, EA / LENGTH, mass, full)
+    assert full > 1e5 and 0.7 * bound < tension.max() < bound
+
+
 def test_the_ramp_of_a_load_is_the_shortest():
     k, mass, speed = EA / LENGTH, 2e8, 0.5
     jerk = towing.start_load(0, speed, k, mass)
     assert jerk == pytest.approx(speed * math.sqrt(k * mass))
-    for share in (0.05, 0.6, 2 / math.pi, 0.7, 0.99):
-        ramp = towing.ramp_for(share * jerk + 3e5, speed, k, mass, 3e5)
-        assert towing.start_load(ramp, speed, k, mass, 3e5) == pytest.approx(share * jerk + 3e5, rel=1e-9)
-        assert towing.start_load(0.99 * ramp, speed, k, mass, 3e5) > share * jerk + 3e5
+    for held in (0, 3e5, 6e6):
+        loads = [towing.start_load(ramp, speed, k, mass, held) for ramp in np.geomspace(1, 1e5, 400)]
+        assert (np.diff(loads) <= 1e-9 * jerk).all()
+        for share in (0.05, 0.6, 2 / math.pi, 0.7, 0.99):
+            ramp = towing.ramp_for(share * jerk + held, speed, k, mass, held)
+            assert towing.start_load(ramp, speed, k, mass, held) == pytest.approx(share * jerk + held, rel=1e-9)
+            assert towing.start_load(0.98 * ramp, speed, k, mass, held) > share * jerk + held
+    assert towing.ramp_for(0.3 * jerk, speed, k, mass) == pytest.approx(2 * mass * speed / (0.3 * jerk))
     assert towing.ramp_for(1.01 * jerk, speed, k, mass) == 0
     assert towing.ramp_for(3e5, speed, k, mass, 3e5) == math.inf
     period = 2 * math.pi * math.sqrt(mass / k)
