@@ -96,6 +96,29 @@ def test_the_simulated_line_is_the_catenary(tmp_path):
     assert json.loads((again.dir / "summary.json").read_text())["state_hash"] == r.hash
 
 
+def test_the_damping_of_a_line_that_sags_is_that_of_its_stretch(tmp_path):
+    """What the pull has beyond the catenary's is c q² times the rate of the span, q the share of the stretch in it."""
+    damping = 5e6
+    r = run(tmp_path, changed(BERG, run__dt=0.5, run__duration=600, tow__ramp=300, body__drag=None,
+                              tow__line={"weight": WEIGHT}, tow__line_damping=damping), "--quiet")
+    span, pull = r.series("line_length", "tow_force")
+    line = towing.Catenary(LENGTH, EA, WEIGHT)
+    static = np.array([line.pull(s) for s in span[:-1]])
+    share = np.array([line.stiffness_at(p) for p in static]) * LENGTH / EA
+    damped = damping * share ** 2 * np.diff(span) / 0.5
+    assert share.min() < 0.1 and share.max() > 0.5 and damped.max() > 5e4
+    assert np.abs(pull[:-1] - static - damped).max() < 1e-3 * damped.max()
+
+
+def test_a_line_with_weight_that_is_too_stiff_for_the_step_is_stable(tmp_path):
+    """A hundred times as stiff and forty times the step: no swing, and in the end the same tow."""
+    case = changed(BERG, body__drag=None, run__duration=4000, tow__ramp=1300, tow__line={"weight": WEIGHT},
+                   tow__line_stiffness=100 * EA, tow__line_damping=None)
+    fine = run(tmp_path, changed(case, run__dt=0.5), "--quiet", name="fine").series("tow_force")
+    coarse = run(tmp_path, changed(case, run__dt=20), "--quiet", name="coarse").series("tow_force")
+    assert coarse[-1] == pytest.approx(fine[-1], rel=0.01) and coarse.max() < 1.05 * fine.max()
+
+
 def test_a_branch_with_weight_breaks_by_the_tension_at_its_ends(tmp_path):
     """The pull at which it parts lies below the breaking load by what the weight adds."""
     heavy = changed(BERG, tow__line={"weight": "2 kN/m", "breaking_load": "2 MN"}, tow__ramp=60)
