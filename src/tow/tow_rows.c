@@ -185,14 +185,14 @@ void bt_tow_begin_rows(bt_world *w)
     const double theta = h2 > 2 ? 1 - 2 / h2 : 0;
     for (int k = 0; k < t->n_branches; k++) {
         bt_branch *b = &t->branch[k];
-        double pull = b->k * (b->length - b->length0), c = b->c;
+        double a = t->dt * b->k * (b->length - b->length0), c = b->c;
         b->taut = !b->broken && (b->weight > 0 || b->length > b->length0 || b->length + t->dt * rate[k] > b->length0);
         if (b->weight > 0) {
             double tangent;
-            pull = pull_at(b, b->length, &tangent);
+            a = t->dt * pull_at(b, b->length, &tangent);
             c *= tangent / b->k * (tangent / b->k);
         }
-        b->a = b->broken ? 0 : t->dt * pull;
+        b->a = b->broken ? 0 : a;
         b->b = b->broken ? 0 : t->dt * (b->stiff * theta * t->dt + (b->taut ? c : 0));
     }
 }
