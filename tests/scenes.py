@@ -105,6 +105,7 @@ SCENES = {
                               tow__branch2={"hull_x": 0.5, "hull_y": -0.8, "length": 2.8, "stiffness": 1500,
                                             "damping": 50}),
     "line_named": changed(LINE, tow__line_stiffness=None, tow__line={"type": "polypropylene", "diameter": "8 mm"}),
+    "line_weight": changed(LINE, tow__line={"weight": 20, "branches": 2}),
     "thrust": changed(LINE, tow__mode="thrust", tow__speed=0.5, tow__vessel=SHIP),
     "thrust_waypoints": changed(GEO, tow=GEO_THRUST | {"waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3,
                                                        "vessel": SHIP}),

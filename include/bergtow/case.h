@@ -179,6 +179,7 @@ typedef struct bt_case {
             double diameter;     ///< m, of a named line
             int64_t branches;    ///< 1, or 2: a bridle
             double breaking_load;///< N, 0 = never breaks
+            double weight;       ///< in water, N/m; 0 = straight, without sag (catenary.h)
         } line;
         struct {                 ///< the second branch; default: as the first, on the other side of the hull
             double hull_x, hull_y, length, stiffness, damping, breaking_load; ///< m, m, m, N, N s/m, N

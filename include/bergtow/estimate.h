@@ -136,6 +136,10 @@ const bt_estimate_def *bt_estimate_of(int k);
 /// Strength of the ice P, N/m.
 double bt_estimate_strength(const bt_estimate_input *in);
 
+/// Resistance of a ship in pack ice, by the regression above: slender to blunt. N; beam and thickness in m, speed m/s
+/// through the ice.
+bt_estimate bt_estimate_ship(double beam, double thickness, double concentration, double speed, double ice_density);
+
 /// One estimate at the given conditions.
 bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in);
 

@@ -31,9 +31,10 @@ from .functions import (Outlines, Picture, budget, capability, converge, design,
 from .result.dataset import Result, open_result
 from .simulation import Simulation, run
 from .study.ensemble import Ensemble
+from . import towing
 
 __version__ = "0.1.0"
 __all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Force", "Outlines", "Picture", "Result",
            "Simulation", "budget", "capability", "converge", "design", "library_path", "open_result", "outlines",
            "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
-           "report", "run", "start_mpi", "statistics"]
+           "report", "run", "start_mpi", "statistics", "towing"]

@@ -51,6 +51,12 @@ class Mean(ctypes.Structure):
                 ("tau", c_double), ("n_eff", c_double), ("n", c_int64)]
 
 
+class Estimate(ctypes.Structure):
+    """bt_estimate"""
+    _fields_ = [("force", c_double), ("low", c_double), ("high", c_double), ("valid", c_bool), ("compares", c_bool),
+                ("note", c_char_p)]
+
+
 class Status(c_int):
     """bt_status of a call: what is not OK is raised, with what the library says of it."""
 
@@ -90,6 +96,9 @@ _SIGNATURES = {
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
     "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
+    "bt_catenary_span": (c_double, c_double, c_double, c_double, c_double),
+    "bt_catenary_pull": (c_double, c_double, c_double, c_double, c_double, POINTER(c_double)),
+    "bt_estimate_ship": (Estimate, c_double, c_double, c_double, c_double, c_double),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),

@@ -111,9 +111,12 @@ static void print_line(const bt_case *c)
         printf(" and (%.4g, %.4g) m", whole(c->tow.branch2.hull_x), whole(c->tow.branch2.hull_y));
     printf(" from the centroid of the waterline, along the body's own x and y\n");
     if (c->tow.line.type != BT_ROPE_NUMBERS)
-        printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight "
-               "and sag are not simulated\n",
-               1e3 * c->tow.line.diameter, rope.mass, rope.stiffness, rope.breaking, rope.source);
+        printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s)%s\n",
+               1e3 * c->tow.line.diameter, rope.mass, rope.stiffness, rope.breaking, rope.source,
+               c->tow.line.weight > 0 ? "" : "; weight and sag are not simulated");
+    if (c->tow.line.weight > 0)
+        printf("line, weight         %.4g N/m in water, an elastic catenary; it starts with a pull of %.4g N\n",
+               c->tow.line.weight, BT_START_PULL * c->tow.line.weight * c->tow.line_length);
     printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n",
            bt_case_line_period(c), bt_case_steepest_ramp(c), BT_RAMP_PERIODS,
            bt_case_start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");

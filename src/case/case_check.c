@@ -481,6 +481,21 @@ static double least_width(int n, const double *v)
     return least;
 }
 
+/// Square of the least radius of gyration of an area about an axis through its centroid, the origin, m².
+static double least_gyration2(int n, const double *v)
+{
+    double area = 0, xx = 0, yy = 0, xy = 0; // twice, and 12, 12 and 24 times, the integrals of 1, x², y² and x y
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), cross = p[0] * q[1] - p[1] * q[0];
+        area += cross;
+        xx += cross * (p[0] * p[0] + p[0] * q[0] + q[0] * q[0]);
+        yy += cross * (p[1] * p[1] + p[1] * q[1] + q[1] * q[1]);
+        xy += cross * (2 * p[0] * p[1] + p[0] * q[1] + q[0] * p[1] + 2 * q[0] * q[1]);
+    }
+    xx /= 6 * area, yy /= 6 * area, xy /= 12 * area;
+    return 0.5 * (xx + yy) - bt_hypot(0.5 * (xx - yy), xy);
+}
+
 /// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away,
 /// and guard.overlap: 0 lets bodies into each other.
 static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
@@ -630,6 +645,12 @@ void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
                       "unit wrong?",
                       c->body.mass > 0 ? "body.mass" : "body.density", ratio);
     const double least = least_width(n, v);
+    const double height = least_gyration2(n, v) / c->body.draft - 0.5 * c->body.sail;
+    if (c->body.draft <= BT_ODD_DRAFT * least && height < 0 && c->domain.frame == BT_FRAME_GEOGRAPHIC)
+        bt_warn(warnings, BT_WARN_BERG_STABILITY,
+                "body.draft: %g m and a sail of %.4g m: a column of ice with this waterline would roll over, its "
+                "metacentric height is %.3g m, at a least width of %.4g m; check them, or expect a berg with a foot",
+                c->body.draft, c->body.sail, height, least);
     if (c->body.draft > BT_ODD_DRAFT * least)
         bt_warn(warnings, BT_WARN_ODD_DRAFT,
                 "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check both, "

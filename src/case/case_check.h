@@ -50,6 +50,8 @@ void bt_case_check_lead(const bt_check *k);
 /// draft / least width of the waterline beyond which a body would hardly stay upright, assumed: a column of ice of
 /// uniform density does up to 0.94 (disc), bergs with a foot beyond that
 #define BT_ODD_DRAFT 2.0
+// A column stays upright while GM = BM − BG > 0, BM = (I/A)/draft, BG = sail/2 [metacentre as in Bass 1980, Annals of
+// Glaciology]; asked at sea only, where nothing holds the body upright.
 #define BT_LONG_IMPACT 20.0 ///< time steps of a collision beyond which one may be, assumed
 /// Mass and draft of the body, and duration of its collisions, that no body may have.
 void bt_case_warn_body(const bt_case *c, bt_errors *warnings);
@@ -94,9 +96,10 @@ double bt_case_tow_cut(const bt_case *c);
 double bt_case_tow_turn(const bt_case *c, int k);
 
 /// Natural period of the body, with added mass, on its line or lines (taken as parallel), against the vessel in mode
-/// thrust, s; 0 without a line.
+/// thrust, s; 0 without a line. Of a line with a weight as it starts: the longest, since it stiffens with the pull.
 double bt_case_line_period(const bt_case *c);
 
+#define BT_START_PULL 2.0 ///< of a line with a weight, in its weights: it sags by L/16 then, assumed
 #define BT_RAMP_PERIODS 2.0 ///< of the body on its line that a start takes which does not jerk it, assumed
 
 /// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a

@@ -78,7 +78,7 @@ static void list(const bt_case *c, idle out[RULES])
         {c->body.shape != BT_BODY_ABSENT && c->tow.mode == BT_TOW_NONE, "tow.ramp", "tow.mode",
          "on a body that is not towed (tow.mode: none)"},
         {!line, "tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type "
-                "tow.line.diameter tow.line.branches tow.line.breaking_load " BRANCH2,
+                "tow.line.diameter tow.line.branches tow.line.breaking_load tow.line.weight " BRANCH2,
          "tow.mode", "without a line, which tow.mode: line and thrust have"},
         {line && c->tow.line.branches < 2, BRANCH2, "tow.line.branches", "on a single line (tow.line.branches)"},
         {c->tow.mode != BT_TOW_THRUST, "tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull "

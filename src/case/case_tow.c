@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/path.h"
+#include "bergtow/catenary.h"
 #include "case/warning.h"
 #include "case/rope.h"
 #include "bergtow/shape.h"
@@ -90,19 +91,30 @@ static void hull_at(const bt_case *c, double hx, double hy, double at[2])
     at[1] = c->body.y + sy * hx + cy * hy;
 }
 
+/// Distance of the ends of a branch at the start, m: just taut, without tension. A line with a weight is never without:
+/// it starts with BT_START_PULL times its weight.
+static double start_span(const bt_case *c, double length, double stiffness)
+{
+    const double w = c->tow.line.weight;
+    if (!(w > 0 && length > 0 && stiffness > 0)) return length;
+    return bt_catenary_span(length, stiffness, w, BT_START_PULL * w * length);
+}
+
 bool bt_case_tow_start(const bt_case *c, double at[2])
 {
     const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     // A line's length ahead of the fastening point: taut, without tension.
     double p[2], q[2];
     hull_at(c, c->tow.hull_x, c->tow.hull_y, p);
-    at[0] = p[0] + c->tow.line_length * ux;
-    at[1] = p[1] + c->tow.line_length * uy;
+    const double length[2] = {start_span(c, c->tow.line_length, c->tow.line_stiffness),
+                              start_span(c, c->tow.branch2.length, c->tow.branch2.stiffness)};
+    at[0] = p[0] + length[0] * ux;
+    at[1] = p[1] + length[0] * uy;
     if (c->tow.line.branches < 2 || !has_line(c)) return true;
     // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are
     // just taut may lie far off the tow's axis, when one point lies ahead of the other.)
     hull_at(c, c->tow.branch2.hull_x, c->tow.branch2.hull_y, q);
-    const double *const hull[2] = {p, q}, length[2] = {c->tow.line_length, c->tow.branch2.length};
+    const double *const hull[2] = {p, q};
     const double mx = 0.5 * (p[0] + q[0]), my = 0.5 * (p[1] + q[1]);
     double ahead = INFINITY;
     for (int k = 0; k < 2; k++) {
@@ -200,10 +212,32 @@ void bt_case_tow_course(const bt_check *k)
         c->tow.direction = bt_atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
 }
 
+/// Stiffness of a branch, N/m: of one with a weight as it starts, if that is wanted, or stretched.
+static double branch_stiffness(const bt_case *c, double length, double stiffness, bool at_start)
+{
+    double tangent = stiffness / length;
+    const double span = start_span(c, length, stiffness);
+    if (at_start && span != length) bt_catenary_pull(length, stiffness, c->tow.line.weight, span, &tangent);
+    return tangent;
+}
+
+/// Period of the body on its line or lines, s; 0 without a line.
+static double period_on(const bt_case *c, bool at_start)
+{
+    if (!has_line(c)) return 0;
+    const double body = bt_case_body_mass(c) * (1 + c->body.added_mass),
+                 vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass);
+    const double mass = c->tow.mode == BT_TOW_THRUST ? body * vessel / (body + vessel) : body;
+    double k = branch_stiffness(c, c->tow.line_length, c->tow.line_stiffness, at_start);
+    if (c->tow.line.branches > 1) k += branch_stiffness(c, c->tow.branch2.length, c->tow.branch2.stiffness, at_start);
+    const double period = 2 * BT_PI * sqrt(mass / k);
+    return isfinite(period) ? period : 0;
+}
+
 /// At sea: a share of the critical damping of the body on its line or lines, N s/m; 0 without a line.
 static double damping_of(const bt_case *c)
 {
-    const double stiffness = c->tow.line_stiffness / c->tow.line_length, period = bt_case_line_period(c);
+    const double stiffness = c->tow.line_stiffness / c->tow.line_length, period = period_on(c, false);
     // 2 ζ k/ω of each of parallel lines makes 2 ζ M ω of them all
     return period > 0 ? DAMPING * stiffness * period / BT_PI : 0;
 }
@@ -233,18 +267,9 @@ void bt_case_tow_follow(const bt_check *k)
 
 // A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r
 // with that amplitude. A sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and
-// whole periods leave no swing behind.
-double bt_case_line_period(const bt_case *c)
-{
-    if (!has_line(c)) return 0;
-    const double body = bt_case_body_mass(c) * (1 + c->body.added_mass),
-                 vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass);
-    const double mass = c->tow.mode == BT_TOW_THRUST ? body * vessel / (body + vessel) : body;
-    double k = c->tow.line_stiffness / c->tow.line_length;
-    if (c->tow.line.branches > 1) k += c->tow.branch2.stiffness / c->tow.branch2.length;
-    const double period = 2 * BT_PI * sqrt(mass / k);
-    return isfinite(period) ? period : 0;
-}
+// whole periods leave no swing behind. A line with a weight is softest as it starts, where its slack is still to be
+// taken up, and that period is the longest.
+double bt_case_line_period(const bt_case *c) { return period_on(c, true); }
 
 double bt_case_steepest_ramp(const bt_case *c)
 {

@@ -337,6 +337,9 @@ bt_key bt_case_keys[] = {
         "lines from hull to towing end: one, or two as a bridle"),
     REAL("tow.line.breaking_load", tow.line.breaking_load, FORCE, "= 0 N, of a named line its own when new",
          "[0, 1e12]", "mean tension of a step above which the branch is broken for good, 0 = never"),
+    REAL("tow.line.weight", tow.line.weight, LINE_LOAD, "0 N/m", "[0, 1e5]",
+         "weight of the line in water, of each branch: it sags as an elastic catenary, and starts with twice its "
+         "weight as the pull, assumed; 0 = straight, without sag"),
     REAL("tow.branch2.hull_x", tow.branch2.hull_x, LENGTH,
          "= outermost point of the waterline on the -y side of the tow", "[-1e5, 1e5]",
          "where the second branch is fastened, along the body's own x"),

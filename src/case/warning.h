@@ -68,6 +68,8 @@
     ROW(SHORT_RAMP, "short_ramp", "ramp_s period_s least_s", "the start jerks the line")                               \
     ROW(ODD_MASS, "odd_mass", "key ratio", "the body does not have the mass of the water that it displaces")           \
     ROW(ODD_DRAFT, "odd_draft", "draft_m ratio width_m", "the body is so deep that it would capsize")                  \
+    ROW(BERG_STABILITY, "berg_stability", "draft_m - metacentric_height_m width_m",                                   \
+        "a column with the body's waterline, draft and sail would roll over")                                          \
     ROW(SHORT_RUN, "short_run", "ramp_s duration_s", "the run ends within the ramp of the tow")                        \
     ROW(LONG_IMPACT, "long_impact", "duration_s steps", "collisions are taken to last longer than they do")            \
     ROW(TABLE_ROWS, "table_rows", "key dt_s rows first_s", "a table changes within less than a time step")             \

@@ -93,6 +93,17 @@ static bt_estimate ships(const bt_estimate_input *in)
                                           : "extrapolated: a regression of ships, and this is none"};
 }
 
+bt_estimate bt_estimate_ship(double beam, double thickness, double concentration, double speed, double ice_density)
+{
+    const bt_estimate_input in = {.concentration = concentration,
+                                  .thickness = thickness,
+                                  .width = beam,
+                                  .along = speed,
+                                  .ice_density = ice_density,
+                                  .ship = true};
+    return concentration > 0 && thickness > 0 && speed > 0 ? ships(&in) : just(0, true, "no ice, or at rest");
+}
+
 static bt_estimate open_water(const bt_estimate_input *in)
 {
     return just(in->drag * in->water_speed * in->water_along, true, "drag of the water alone");

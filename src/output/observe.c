@@ -99,10 +99,10 @@ static void observe_line(const bt_tow *tow, bt_sample *s)
     s->line_length = b->length;
     s->carriage_x = tow->carriage_x;
     s->carriage_y = tow->carriage_y;
-    s->tow_force = s->line_tension * (b->lx * tow->ux + b->ly * tow->uy);
+    s->tow_force = bt_tow_pull(tow, 0) * (b->lx * tow->ux + b->ly * tow->uy);
     for (int k = 1; k < tow->n_branches; k++) {
         const double t = bt_tow_tension(tow, k);
-        s->tow_force += t * (tow->branch[k].lx * tow->ux + tow->branch[k].ly * tow->uy);
+        s->tow_force += bt_tow_pull(tow, k) * (tow->branch[k].lx * tow->ux + tow->branch[k].ly * tow->uy);
         s->line_tension = bt_max(s->line_tension, t);
     }
     s->line_tension_1 = bt_tow_tension(tow, 0);

@@ -89,9 +89,11 @@ const bt_quantity bt_own_series[] = {
     ROW(body_in_ice_x, BODY, LAST, "m",
         "centroid of the towed body in a frame that drifts with undisturbed ice, x: its way through the ice"),
     ROW(body_in_ice_y, BODY, LAST, "m", "the same, y"),
-    ROW(line_tension, LINE, MEAN, "N", "tension of the tow line, of two branches the larger; NaN without a line"),
+    ROW(line_tension, LINE, MEAN, "N",
+        "tension of the tow line, with a weight that at its ends, of two branches the larger; NaN without a line"),
     ROW(line_length, LINE, LAST, "m",
-        "length of the tow line (of its first branch) at the start of the step; NaN without a line"),
+        "length of the tow line (of its first branch) at the start of the step, with a weight the distance of its "
+        "ends; NaN without a line"),
     ROW(carriage_x, LINE, LAST, "m", "towing end of the line, x; NaN without a line"),
     ROW(carriage_y, LINE, LAST, "m", "towing end of the line, y; NaN without a line"),
     SHOWN(line_tension_1, LINE, MEAN, "N",

@@ -26,7 +26,8 @@ bt_tow *bt_setup_tow(const bt_case *c)
                       .c = c->tow.line_damping,
                       .hull_x = c->tow.hull_x,
                       .hull_y = c->tow.hull_y,
-                      .breaking = c->tow.line.breaking_load},
+                      .breaking = c->tow.line.breaking_load,
+                      .weight = c->tow.line.weight},
         .dt = c->run.dt,
         .carriage_x = start[0],
         .carriage_y = start[1],
@@ -39,7 +40,8 @@ bt_tow *bt_setup_tow(const bt_case *c)
                                    .c = c->tow.branch2.damping,
                                    .hull_x = c->tow.branch2.hull_x,
                                    .hull_y = c->tow.branch2.hull_y,
-                                   .breaking = c->tow.branch2.breaking_load};
+                                   .breaking = c->tow.branch2.breaking_load,
+                                   .weight = c->tow.line.weight};
     if (c->tow.n_programme > 0) {
         t->n_programme = c->tow.n_programme;
         t->programme = bt_alloc((size_t)t->n_programme, 2 * sizeof *t->programme);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // How the body is towed: prescribed velocity, or one or two elastic lines to an end that follows a path or to a vessel.
 //
-// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs straight (no sag) from a point on the
-// hull to the towing end. T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more unilateral row of the
-// solver, λ = Δt T ≥ 0:
+// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs straight (without a weight, no sag)
+// from a point on the hull to the towing end. T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more
+// unilateral row of the solver, λ = Δt T ≥ 0:
 //     λ_i = max(0, a_i + b_i l̇2_i),   a = Δt k (l1 − L0),  b = Δt (k θ Δt + c),   l̇2 = l̂·(U_end,2 − v_hull,2)
 // (l̂: from hull to end at the start of the step). While l1 + Δt l̇* (at the free velocities) is still below L0, b has
 // no c: a line damps only when it is stretched. With X2 = X1 + Δt U2, θ = 0 is the symplectic Euler scheme: no
@@ -13,6 +13,12 @@
 // is resolved (h ≤ √2), tending to backward Euler for a line too stiff for the step; a slower mode has h²(1 − 2θ) ≤ 4
 // as well. Stable for any stiffness [D]. The turning of the line within a step is explicit: its swing, ω² = T/(l M), is
 // slow.
+//
+// Weight. A branch with a weight w in water is an elastic catenary between its ends (bergtow/catenary.h), quasi-static,
+// without the drag of the water on it [assumed]. Its row bears the pull H(l1) in place of k (l1 − L0); k θ Δt has the
+// tangent dH/dl, which grows with l, at the longer of l1 and l1 + Δt l̇*, and so has h. The dashpot lies beside the
+// stretch alone: of l̇ it sees the share q = (dH/dl)/k, and to first order it is one of c q² between the ends. The
+// tension that breaks a branch is that at its ends, √(H² + (w L0/2)²).
 //
 // Vessel (mode thrust). A point of mass M (with added mass) that touches no ice [assumed], on the end of the line.
 // Course d: towards the point of the planned path that lies `lookahead` ahead of the vessel's own place on it
@@ -42,6 +48,8 @@
 #ifndef BERGTOW_TOW_H
 #define BERGTOW_TOW_H
 
+#include <math.h>
+
 #include "bergtow/case.h"
 #include "geometry/path.h"
 #include "bergtow/world.h"
@@ -54,6 +62,7 @@ typedef struct bt_branch {
     double length0, k, c;     ///< m, N/m, N s/m
     double hull_x, hull_y;    ///< fastening point, body frame, m
     double breaking;          ///< breaking load, N; 0 = never breaks
+    double weight;            ///< in water, N/m; 0 = straight
     // state
     bool broken;
     double lambda;            ///< impulse of the last step, N s (starts the next solve)
@@ -62,7 +71,8 @@ typedef struct bt_branch {
     double rx, ry;            ///< arm from the centroid to the fastening point, m
     double lx, ly;            ///< unit vector from the hull to the end
     double rxl;               ///< arm × unit vector, m
-    double length;            ///< l1, m
+    double length;            ///< l1, m: of a branch with a weight its span
+    double stiff;             ///< k, or the tangent of the catenary, N/m
     double a, b;              ///< λ = max(0, a + b l̇2)
     double w;                 ///< W, 1/kg; of a vessel without power
 } bt_branch;
@@ -145,8 +155,16 @@ void bt_tow_warm_start(bt_tow *t, bool keep);
 /// At the end of a step, after the body has moved: the end moves, branches break, events are noted.
 void bt_tow_advance(bt_world *w);
 
-/// Tension of branch k in the last step, N.
-static inline double bt_tow_tension(const bt_tow *t, int k) { return t->branch[k].lambda / t->dt; }
+/// Pull of branch k in the last step, along the line between its ends, N.
+static inline double bt_tow_pull(const bt_tow *t, int k) { return t->branch[k].lambda / t->dt; }
+
+/// Its tension, N: of a branch with a weight that at its ends, which bear half of the weight each.
+static inline double bt_tow_tension(const bt_tow *t, int k)
+{
+    const bt_branch *b = &t->branch[k];
+    const double pull = bt_tow_pull(t, k), half = 0.5 * b->weight * b->length0;
+    return half > 0 && pull > 0 ? sqrt(pull * pull + half * half) : pull; // none of one that has parted
+}
 
 uint64_t bt_tow_hash(const bt_tow *t);
 

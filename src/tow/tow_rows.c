@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#include "bergtow/catenary.h"
+
 // --- the vessel ------------------------------------------------------------------------------------------------------
 
 void bt_tow_begin_vessel(bt_world *w)
@@ -133,10 +135,16 @@ static double hull_rate(const bt_branch *b, const bt_vel *v) { return v->x * b->
 /// (Δt ω)² of the fastest mode: the larger eigenvalue of Δt² K^½ W K^½.
 static double fastest_mode(const bt_tow *t, const double w[BT_MAX_BRANCHES], double w12)
 {
-    const double p = t->dt * t->dt * t->branch[0].k * w[0], q = t->dt * t->dt * t->branch[1].k * w[1];
+    const double p = t->dt * t->dt * t->branch[0].stiff * w[0], q = t->dt * t->dt * t->branch[1].stiff * w[1];
     if (p == 0 || q == 0) return p + q;
-    const double c2 = t->dt * t->dt * t->dt * t->dt * t->branch[0].k * t->branch[1].k * w12 * w12;
+    const double c2 = t->dt * t->dt * t->dt * t->dt * t->branch[0].stiff * t->branch[1].stiff * w12 * w12;
     return 0.5 * (p + q) + sqrt(0.25 * (p - q) * (p - q) + c2);
+}
+
+/// Pull of a branch with a weight at a span, and its derivative.
+static double pull_at(const bt_branch *b, double span, double *tangent)
+{
+    return bt_catenary_pull(b->length0, b->k * b->length0, b->weight, span, tangent);
 }
 
 void bt_tow_begin_rows(bt_world *w)
@@ -151,6 +159,7 @@ void bt_tow_begin_rows(bt_world *w)
     const end_motion idle = end_of(t, IDLE);
     end_motion free_end = idle; // without the line: as fast as power and governor let it
     if (t->mode == BT_TOW_THRUST) free_end.d = bt_max(idle.d, bt_min(t->vessel.full, t->end_speed));
+    double rate[BT_MAX_BRANCHES] = {0};
     for (int k = 0; k < t->n_branches; k++) {
         bt_branch *b = &t->branch[k];
         b->rx = cosine * b->hull_x - sine * b->hull_y;
@@ -164,6 +173,9 @@ void bt_tow_begin_rows(bt_world *w)
         b->rxl = b->rx * b->ly - b->ry * b->lx;
         t->body_w[k] = inv.m + inv.i * b->rxl * b->rxl;
         b->w = t->body_w[k] + end_w(t, &idle, k, k);
+        rate[k] = end_rate(t, &free_end, b) - hull_rate(b, v);
+        b->stiff = b->k;
+        if (b->weight > 0) pull_at(b, bt_max(b->length, b->length + t->dt * rate[k]), &b->stiff);
     }
     t->coupling = t->n_branches > 1
                       ? inv.m * (first->lx * second->lx + first->ly * second->ly) + inv.i * first->rxl * second->rxl
@@ -173,10 +185,15 @@ void bt_tow_begin_rows(bt_world *w)
     const double theta = h2 > 2 ? 1 - 2 / h2 : 0;
     for (int k = 0; k < t->n_branches; k++) {
         bt_branch *b = &t->branch[k];
-        const double rate = end_rate(t, &free_end, b) - hull_rate(b, v);
-        b->taut = !b->broken && (b->length > b->length0 || b->length + t->dt * rate > b->length0);
-        b->a = b->broken ? 0 : t->dt * b->k * (b->length - b->length0);
-        b->b = b->broken ? 0 : t->dt * (b->k * theta * t->dt + (b->taut ? b->c : 0));
+        double a = t->dt * b->k * (b->length - b->length0), c = b->c;
+        b->taut = !b->broken && (b->weight > 0 || b->length > b->length0 || b->length + t->dt * rate[k] > b->length0);
+        if (b->weight > 0) {
+            double tangent;
+            a = t->dt * pull_at(b, b->length, &tangent);
+            c *= tangent / b->k * (tangent / b->k);
+        }
+        b->a = b->broken ? 0 : a;
+        b->b = b->broken ? 0 : t->dt * (b->stiff * theta * t->dt + (b->taut ? c : 0));
     }
 }
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The same bits on any number of ranks and threads with everything a tow can have: bridle, vessel, way-points, a branch
-that breaks.
+that breaks, with and without a weight.
 
 What turns these tests red: the impulse of the second branch not sent to the other ranks after the solve (tried: the
 branch then breaks there at another time, or not), a vessel moved before that.
 """
 import h5py
+import pytest
 
 from harness import changed, run
 from test_ranks import LINE, assert_same, many
@@ -26,8 +27,9 @@ BRIDLE = changed(LINE,
                  })
 
 
-def test_a_vessel_on_a_bridle_that_breaks(tmp_path):
-    one = run(tmp_path, BRIDLE, "--threads", 1, "--quiet")
+@pytest.mark.parametrize("weight", [0, 5])
+def test_a_vessel_on_a_bridle_that_breaks(tmp_path, weight):
+    one = run(tmp_path, changed(BRIDLE, tow__line__weight=weight), "--threads", 1, "--quiet")
     with h5py.File(one.dir / "result.h5") as f:
         kinds = list(f["events/kind"][:])
     # a branch broke while the other held; a way-point was passed
