@@ -56,9 +56,9 @@ FIRST = 2                    # fields by which it is measured how long one takes
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
 FEW = 5                      # fields below which nothing is known of the scatter between them
-CASES_SHARE, ROUNDS = 0.4, 10  # of the budget for load cases and ranges, at most, and runs one after the other of them
+CASES_SHARE, CASE_RUNS = 0.4, 34  # of the budget for load cases and ranges, at most, and how many runs these are
 SLOWER = 1.6                 # a run / the program's own estimate of it: where the first fields are still to come
-CASE_FIELDS = 2              # of a load case
+PAIRED, OF_A_CASE = 4, 2     # fields: paired with those of the case as it is, and of other load cases
 
 
 @dataclass
@@ -265,13 +265,12 @@ def beside(work, a, row, t, minutes):
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
     end = time.monotonic() + 60 * minutes
     with locked(a.output / "load-cases") as lock:
+        n = (1, 1) if read_ice_of(t.case) else (PAIRED, OF_A_CASE)
         runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
-                                        lock=lock), range(1 if read_ice_of(t.case) else CASE_FIELDS))
+                                        lock=lock), *map(range, n), a.no_load_cases)
         def say(words):
             if not a.quiet:
                 print(words, flush=True)
-        if a.no_load_cases:
-            runs.left_out = True
         start, ramp = load_cases.start(t, runs, say)
         cases = [start, load_cases.head_sea(t, runs, a.head_current, a.head_wind),
                  load_cases.course_change(t, runs, a.bend, a.bend_radius), load_cases.stop(t),
@@ -418,7 +417,7 @@ def planned(a, case, found, began):
     end = ending(a, began, n)
     plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     if np.isfinite(end):
-        end -= min(CASES_SHARE * (end - time.monotonic()), ROUNDS * SLOWER * plan["core_s"]) * (not a.no_load_cases)
+        end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"]) * (not a.no_load_cases)
         plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     print(answer_text.plan(plan), flush=True)
     return Work(program_path(), a.output, a.set, a.jobs, end, a.quiet), plan | {"speed_m_s": found["speed"]}

@@ -282,8 +282,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
         band |= {"low_n": low, "high_n": high, "combined_95": both, "why_not_combined": why}
     efficiency, factor = asked["efficiency"], asked["line_factor"]
     n, interval = (top["n"], top["interval_95"]) if top else (np.nan, None)
-    needed = [gear.needed_pull(v, x, asked["speed_m_s"], efficiency) for x in (n, *(interval or (None, None)))
-              if x is not None]
+    needed = [gear.needed_pull(v, max(0.0, x), asked["speed_m_s"], efficiency) for x in (n, *(interval or ()))]
     by_speed = speeds(rows, v, efficiency)
     pull = gear.pull_at(v, asked["speed_m_s"], efficiency)
     vessel = {"id": "vessel", "name": v.name or None, "needed_bollard_pull_n": needed[0],

@@ -91,9 +91,9 @@ def line(text, case, library=None):
 
 
 def needed_pull(v, load, speed, efficiency, own=0.0):
-    """Bollard pull, N, for a tow force at a speed; NaN of NaN, inf at the free-running speed and beyond."""
-    if not np.isfinite(load) or speed >= v.free_speed:
-        return load if not np.isfinite(load) else np.inf
+    """Bollard pull, N, for a tow force at a speed; inf at the free-running speed and beyond. What is not finite stays."""
+    if not np.isfinite(load):
+        return load
     return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
 
 

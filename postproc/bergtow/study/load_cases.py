@@ -79,16 +79,17 @@ class Runs:
     """The runs of load cases and ranges: study/runs.py, with a count, and without an end where one fails."""
 
     runs: object
-    fields: range
+    fields: range           #: of paired runs, whose interval is that of these fields
+    few: range              #: of those of which the largest value is taken
     left_out: bool = False  #: none is to be made
     count: int = 0
     spent: bool = False
 
-    def make(self, name, sets):
+    def make(self, name, sets, fields=None):
         """None where they are there, or the code of why they are not: "budget", "run_failed"."""
         if self.left_out or self.spent:
             return "left_out" if self.left_out else "budget"
-        why = self.runs.make(name, self.fields, sets)
+        why = self.runs.make(name, fields or self.fields, sets)
         if SPENT in why:
             self.spent = True
             return "budget"
@@ -97,10 +98,10 @@ class Runs:
         self.count += len(why)
         return None
 
-    def measured(self, name, measure):
+    def measured(self, name, measure, fields=None):
         """[measure(run)] of the fields."""
         out = []
-        for i in self.fields:
+        for i in fields or self.fields:
             with Run(self.runs.path(name, i)) as run:
                 out.append(measure(run))
         return out
@@ -221,10 +222,10 @@ def start(t, runs, say):
         name = f"start-{seconds:.6g}s"
         sets = {"tow.ramp": f"{seconds:.9g} s", "run.duration": f"{seconds + 4 * t.scale:.9g} s",
                 "output.window_start": f"{seconds:.9g} s"}
-        reason = runs.make(name, sets)
+        reason = runs.make(name, sets, runs.few)
         if reason:
             break
-        n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale)))
+        n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale), runs.few))
         tried.append({"ramp_s": seconds, "n": n})
         say(f"a start with a ramp of {seconds / 60:.3g} min takes {n / 1e3:.0f} kN")
         if n <= t.value:
@@ -238,12 +239,12 @@ def start(t, runs, say):
         found, ramp = closed(reason or "no_ramp_held")
         if tried:
             best = min(tried, key=lambda x: x["n"])
-            found |= {"n": best["n"], "kind": "largest_of_n", "by": "runs", "runs": len(tried) * len(runs.fields)}
+            found |= {"n": best["n"], "kind": "largest_of_n", "by": "runs", "runs": len(tried) * len(runs.few)}
             ramp |= {"s": best["ramp_s"], "n": best["n"], "by": "runs"}
         return found | {"values": found["values"] | {"tried": tried}}, ramp
     ramp |= {"s": held["ramp_s"], "n": held["n"], "by": "runs", "verified": True}
-    return row("start", held["n"], "largest_of_n", "runs", runs=len(tried) * len(runs.fields), set=held["set"],
-               values=own | {"n_tows": len(runs.fields), "ramp_s": held["ramp_s"], "closed_form_s": first,
+    return row("start", held["n"], "largest_of_n", "runs", runs=len(tried) * len(runs.few), set=held["set"],
+               values=own | {"n_tows": len(runs.few), "ramp_s": held["ramp_s"], "closed_form_s": first,
                              "mass_kg": t.mass, "tried": tried}), ramp
 
 
@@ -269,17 +270,27 @@ def course_change(t, runs, degrees, radius):
             "tow.turn_radius": f"{r:.9g} m", "run.duration": f"{duration:.9g} s",
             "output.window_start": f"{t.case_ramp + settle / 2:.9g} s"}
     values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius), "across_n": t.mass * t.speed ** 2 / r}
-    if reason := runs.make("course-change", sets):
+    if reason := runs.make("course-change", sets, runs.few):
         return none("course_change", reason, set=sets, values=values)
     begin = t.case_ramp + settle
-    along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2)))
-    return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.fields),
+    along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2),
+                              runs.few))
+    return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.few),
                set=sets, formula="hypot", values=values | {"along_n": along})
 
 
+def with_steady(t, n, ends, r):
+    """The interval of a changed load with that of the steady tow in it, whose sides change by R'/R: the root of the
+    squares of either; None where one of the two is not known."""
+    if not np.isfinite(ends).all() or t.interval is None or np.isnan(t.interval).any():
+        return None
+    return tuple(n + sign * math.hypot(end - n, r * (own - t.value))
+                 for sign, end, own in zip((-1, 1), ends, t.interval))
+
+
 def changed(t, base, other):
-    """(load, (low, high), parts) of the steady tow in another run: F' = W' + w R'/R. base, other: mean_parts of the
-    fields."""
+    """(load, (low, high) of the paired fields, parts) of the steady tow in another run: F' = W' + w R'/R. base, other:
+    mean_parts of the fields."""
     r, ends = assumed.ratio([b["ice"] for b in base], [o["ice"] for o in other])
     fixed, rest = np.mean([o["drag"] for o in other]), t.value - t.water - t.wind
     return fixed + rest * r, tuple(fixed + rest * x for x in ends), {"ice_ratio": r, "drag_n": fixed, "rest_n": rest}
@@ -303,7 +314,7 @@ def head_sea(t, runs, current, wind):
     n, ends, parts = changed(t, base, other)
     largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
     return row("head_sea", n, "changed", "runs", runs=len(runs.fields), set=sets, formula="changed",
-               interval_95=ends if np.isfinite(ends).all() else None, values=values | parts | {"largest_n": largest})
+               interval_95=with_steady(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
 
 
 # ---- ranges
