@@ -17,6 +17,7 @@ from harness import run as simulated
 import bergtow
 from bergtow import cli
 from bergtow.reporting import design
+from bergtow.reporting import ensemble as report_ensemble
 from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import extreme, largest
@@ -246,8 +247,8 @@ def test_a_remedy_does_not_repeat_what_was_given(budget, tmp_path, monkeypatch, 
     assert float(re.search(r"--budget (\d+)", said)[1]) > budget and "run.duration" not in said
 
 
-CASE = changed(TOW, run={"dt": 0.1, "duration": 40}, output__window_start=10, domain__length=18, ice__concentration=0.3,
-               ice__size=0.9, ice__rafting__kappa=10, estimate__length_scale=400)
+CASE = changed(TOW, run={"dt": 0.2, "duration": 40}, output__window_start=10, domain__length=14, domain__width=7,
+               ice__concentration=0.3, ice__size=0.9, estimate__length_scale=400)
 
 
 @pytest.fixture(scope="module")
@@ -256,8 +257,10 @@ def made(tmp_path_factory):
     write_case(folder, CASE)
     patch = pytest.MonkeyPatch()
     patch.setenv("BERGTOW", str(BERGTOW))
+    patch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     found = bergtow.design(folder / "case.yml", folder / "out", fields=3, vessel="0.001 t", line="150 N", line_factor=2,
-                           no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s")
+                           no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s", bend_radius=1,
+                           head_wind=1)
     patch.undo()
     return found
 
@@ -280,6 +283,9 @@ def test_the_design_value_is_the_largest_load_case(made):
     assert [c["id"] for c in cases] == ["case.steady", "case.start", "case.head_sea", "case.course_change", "case.stop",
                                         "case.loss_of_thrust", "case.line_parted"]
     assert made["design"]["n"] == max(c["n"] for c in cases if c["acts_on"] == "tow" and c["n"] is not None)
+    assert next(c for c in cases if c["id"] == "case.head_sea")["in_design"]  # given; assumed ones are not
+    t = tow(case={"water.current_table": "x"})
+    assert load_cases.head_sea(t, None)["reason"] == "environment_from_table"
     assert all(c["n"] is not None or c["reason"] for c in cases)
     assert made["line"]["utilisation"] == pytest.approx(2 * made["line"]["design_tension_n"] / 150)
 
@@ -301,9 +307,18 @@ def test_ranges_and_head_sea_are_of_the_same_fields(made):
     steady = made["load_cases"][0]["n"]
     assert low <= steady + first["n_low"] < steady < steady + first["n_high"] <= high
     assert made["band"]["why_not_combined"] == "range_without_distribution"
-    assert [r["fields"] for r in made["assumed"]] == [0, 4, 4]
+    assert [r["key"] for r in made["assumed"]] == ["body.drag.water_form", "ice.friction"]
+    assert [r["fields"] for r in made["assumed"]] == [0, 4]
     head = next(c for c in made["load_cases"] if c["id"] == "case.head_sea")
-    assert head["n"] > steady and head["values"]["drag_n"] > first["n_high"]
+    assert head["n"] > steady and head["values"]["wind_m_s"] == 1 and head["values"]["current_m_s"] == 0
+
+
+def test_values_that_are_assumed_stay_beside_the_design_value(made):
+    """Without --head-current and --head-wind the same row is not in the design value. Red: it decides the vessel."""
+    a = json.loads(json.dumps(made))
+    row = next(c for c in a["load_cases"] if c["id"] == "case.head_sea")
+    row["in_design"] = False
+    assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
 
 
 def test_speeds_of_one_call(made):

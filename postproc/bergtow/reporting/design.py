@@ -300,7 +300,7 @@ def answer_of(work, a, plan, began):
         left = (began + 60 * a.budget - RESERVE[0] - time.monotonic()) / 60 if a.budget else np.inf
         cases, ramp, ranges, count = beside(work, a, row, t, left)
     now = time.monotonic()
-    asked = {"concentrations": sorted({r["concentration"] for r in rows}), "speed_m_s": asked_speed,
+    asked = {"concentrations": sorted({round(r["concentration"], 6) for r in rows}), "speed_m_s": asked_speed,
              "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "vessel": a.vessel, "line": a.line,
              "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
              "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
@@ -368,11 +368,11 @@ def options(p):
         p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
     p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
                    "parameters of a study (default: a few with their sources)")
-    p.add_argument("--head-current", type=not_below_zero, default=answer.HEAD_CURRENT, metavar="V",
-                   help="against the tow, m/s, in the load case with head current and wind (default: %(default)s, "
-                   "assumed)")
-    p.add_argument("--head-wind", type=not_below_zero, default=answer.HEAD_WIND, metavar="V",
-                   help="the same of the wind, m/s (default: %(default)s, assumed)")
+    p.add_argument("--head-current", type=not_below_zero, metavar="V", help="against the tow, m/s, in the load case "
+                   f"with head current and wind (default: {load_cases.HEAD_CURRENT:g}, assumed, and then not in the "
+                   "design value)")
+    p.add_argument("--head-wind", type=not_below_zero, metavar="V", help="the same of the wind, m/s (default: "
+                   f"{load_cases.HEAD_WIND:g})")
     p.add_argument("--bend", type=finite, default=answer.BEND, metavar="DEG", help="angle of the course change, "
                    "degrees (default: %(default)s, assumed)")
     p.add_argument("--bend-radius", type=above_zero, metavar="M", help="its radius, m (default: ten body lengths, "

@@ -34,7 +34,6 @@ HALF = 0.5               # of a run is its window, where the case does not say w
 #: parts of a mean tow force: name, key of the summary
 PARTS = (("ice", "mean_ice_resistance_n"), ("water", "estimates_open_water_drag_force_n"), ("wind", None),
          ("coriolis", "mean_coriolis_force_n"), ("slope", "mean_tilt_force_n"), ("inertia", "mean_inertia_force_n"))
-HEAD_CURRENT, HEAD_WIND = 0.25, 15.0   # m/s, of the load case head_sea, assumed
 BEND = 30.0                            # degrees, of the course change, assumed
 
 
@@ -257,6 +256,8 @@ def sentence(a):
     out.append({"code": "line", "values": line, "rows": ["line", line["row"]]})
     if a["feasible"]["verdict"] != "not_asked":
         out.append({"code": "feasible", "values": a["feasible"], "rows": ["feasible"] + [s["id"] for s in a["speeds"]]})
+    out += [{"code": "beside", "values": {"n": c["n"], "case": c["id"]} | c["values"], "rows": [c["id"]]}
+            for c in a["load_cases"] if not c["in_design"] and np.isfinite(c["n"])]
     if a["ramp"]:
         keys = "s", "n", "by", "verified", "case_s", "case_n"
         out.append({"code": "start", "values": {k: a["ramp"][k] for k in keys}, "rows": ["ramp", "case.start"]})
@@ -268,7 +269,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     t: the load_cases.Tow of the hardest condition, None without a value."""
     worst = hardest(rows, asked["speed_m_s"])
     cases = ([steady_case(worst)] if worst else []) + cases
-    some = [c for c in cases if c["n"] is not None and np.isfinite(c["n"])]
+    some = [c for c in cases if c["in_design"] and np.isfinite(c["n"])]
     top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
     hold = max(some, key=lambda c: c["n"], default=None)
     design = top and {"id": "design", "row": top["id"], **{k: top[k] for k in ("n", "kind", "interval_95", "reason")},

@@ -17,7 +17,9 @@ the mean ice resistance, F the design value of the steady tow, k = EA/L of the l
                      nothing damps it, to 3/2 F. A single line: the tow is lost, and the body goes on as above
     head sea         paired runs with current and wind against the tow: as stats/assumed takes a value that changes
 
-Current, wind, angle and radius are assumed unless the call gives them.
+Angle and radius of the bend are assumed unless the call gives them, and so are current and wind. These decide the load
+- a head current of half the speed doubles the drag - so where they are assumed the row stands beside the design value,
+and is not in it.
 """
 import math
 from dataclasses import dataclass
@@ -28,12 +30,14 @@ from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
 from bergtow.study import assumed
 from bergtow.study.runs import SPENT
+from bergtow.table import quantity
 
 import numpy as np
 
 SHORTER = 0.6            # of a ramp that holds: the next that is tried
 LONGER = 1.5             # of one that does not
 RAMPS = 3                # that are tried, at most
+HEAD_CURRENT, HEAD_WIND = 0.25, 15.0  # m/s at full scale, assumed
 SETTLE = 300.0           # s at full scale, before and after a bend
 BEND_WIDTHS = 10.0       # radius of the bend / length of the body, assumed
 PARTED = 1.5             # load of the branch that is left / pull
@@ -136,8 +140,8 @@ def mass_of(run, direction):
 
 
 def row(name, n, kind, by, acts_on="tow", **more):
-    return {"id": f"case.{name}", "n": n, "kind": kind, "by": by, "acts_on": acts_on, "interval_95": None, "runs": 0,
-            "set": {}, "formula": None, "values": {}, "reason": None} | more
+    return {"id": f"case.{name}", "n": n, "kind": kind, "by": by, "acts_on": acts_on, "in_design": True,
+            "interval_95": None, "runs": 0, "set": {}, "formula": None, "values": {}, "reason": None} | more
 
 
 def none(name, reason, **more):
@@ -227,7 +231,7 @@ def start(t, runs, say):
             break
         n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale), runs.few))
         tried.append({"ramp_s": seconds, "n": n})
-        say(f"a start with a ramp of {seconds / 60:.3g} min takes {n / 1e3:.0f} kN")
+        say(f"a start with a ramp of {seconds / 60:.3g} min takes {quantity(n, 'N')}")
         if n <= t.value:
             held = tried[-1] | {"set": sets}
             seconds *= SHORTER
@@ -296,8 +300,11 @@ def changed(t, base, other):
     return fixed + rest * r, tuple(fixed + rest * x for x in ends), {"ice_ratio": r, "drag_n": fixed, "rest_n": rest}
 
 
-def head_sea(t, runs, current, wind):
-    """Current and wind against the tow, on the fields of the base."""
+def head_sea(t, runs, current=None, wind=None):
+    """Current and wind against the tow, m/s, on the fields of the base; None: assumed, at model scale by Froude's law."""
+    given = current is not None or wind is not None
+    current, wind = (x if x is not None else 0.0 if given else y / t.slower
+                     for x, y in ((current, HEAD_CURRENT), (wind, HEAD_WIND)))
     if any(t.case.get(key, "none") != "none" for key in ("water.current_table", "air.wind_table")):
         return none("head_sea", "environment_from_table")
     d = np.array([math.cos(t.direction), math.sin(t.direction)])
@@ -305,7 +312,7 @@ def head_sea(t, runs, current, wind):
                                                                    "air.wind_y")}
     sets = {f"water.current_{k}": f"{own[f'water.current_{k}'] - current * d[i]:.9g} m/s" for i, k in enumerate("xy")}
     sets |= {f"air.wind_{k}": f"{own[f'air.wind_{k}'] - wind * d[i]:.9g} m/s" for i, k in enumerate("xy")}
-    values = {"current_m_s": current, "wind_m_s": wind}
+    values = {"current_m_s": current, "wind_m_s": wind, "given": given}
     if reason := runs.make("base", {}) or runs.make("head-sea", sets):
         return none("head_sea", reason, set=sets, values=values)
     base, other = (runs.measured(name, mean_parts) for name in ("base", "head-sea"))
@@ -313,7 +320,7 @@ def head_sea(t, runs, current, wind):
         return none("head_sea", "no_window", set=sets, values=values)
     n, ends, parts = changed(t, base, other)
     largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
-    return row("head_sea", n, "changed", "runs", runs=len(runs.fields), set=sets, formula="changed",
+    return row("head_sea", n, "changed", "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
                interval_95=with_steady(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
 
 

@@ -148,7 +148,12 @@ def _start(v, a):
     return out
 
 
-WORDS = {"needs": _needs, "needs_largest": _largest, "needs_at_least": _at_least, "band": _band, "vessel": _vessel,
+def _beside(v, a):
+    return (f"Against a current of {short(v['current_m_s'])} m/s and a wind of {short(v['wind_m_s'])} m/s, which are "
+            f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
+
+
+WORDS = {"beside": _beside, "needs": _needs, "needs_largest": _largest, "needs_at_least": _at_least, "band": _band, "vessel": _vessel,
          "line": _line, "feasible": _feasible, "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
@@ -193,11 +198,12 @@ def _behind(row):
 
 def load_cases(a, markdown):
     top = (a["design"] or {}).get("row")
-    rows = [[CASES[c["id"]] + (" *" if c["id"] == top else ""), kn(c["n"]), ends(c["interval_95"]) or "–",
+    rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]), ends(c["interval_95"]) or "–",
              KINDS[c["kind"]], {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
                                 "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
     return table(["load case", "kN", "95 % of the fields", "kind", "by", "with"], rows, markdown) + \
-        ("\n\n* design value" if top else "")
+        ("\n\n* design value" if top else "") + \
+        ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "")
 
 
 def parts(a, markdown):
