@@ -94,7 +94,7 @@ def widths(work, a, case):
     if a.keep_width or domain_width.stays(case, [text.split("=")[0].strip() for text in a.set]):
         return {}
     found = {c: domain_width.needed(work.program, a.file, [*a.set, f"ice.concentration={c!r}"])
-             for c in a.concentrations}
+             for c in a.concentrations or []}
     return {c: width for c, width in found.items() if width}
 
 
@@ -119,7 +119,7 @@ def at_speeds(a, found):
 
 def write_study(a, case, repeats, wider):
     """The study of a case: DIR/design.yml. wider: domain.width by concentration, as of widths. Errors: RunError."""
-    values = [] if reads_ice(case) else a.concentrations
+    values = [] if reads_ice(case) else a.concentrations or []
     study = {
         "title": a.title or title_of(case, a.file.stem, values),
         "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed
@@ -350,6 +350,7 @@ def speeds(text):
 
 
 def options(p):
+    p.set_defaults(by_speed={})
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
                    "where an earlier one ended")
