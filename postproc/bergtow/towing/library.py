@@ -50,8 +50,9 @@ class Vessel:
 
 
 #: head of a table: column, member, factor to SI (None: a text), may it be empty
-_LINES = (("name", "name", None, False), ("material", "material", None, False), ("diameter_mm", "diameter", 1e-3, False),
-          ("mass_kg_m", "mass", 1, False), ("density_kg_m3", "density", 1, False),
+_LINES = (("name", "name", None, False), ("material", "material", None, False),
+          ("diameter_mm", "diameter", 1e-3, False), ("mass_kg_m", "mass", 1, False),
+          ("density_kg_m3", "density", 1, False),
           ("stiffness_kn", "stiffness", 1e3, False), ("breaking_kn", "breaking", 1e3, False),
           ("source", "source", None, False))
 _VESSELS = (("name", "name", None, False), ("bollard_pull_t", "bollard_pull", 1e3 * STANDARD_GRAVITY, False),

@@ -8,9 +8,8 @@ and BM = (I/A)/D. For a block of width W and height H = D + s that floats freely
 
     W/H > √(6 ρ_i/ρ_w (1 − ρ_i/ρ_w)),   0.80 for 900 and 1025 kg/m³
 
-the hydrostatic criterion that Burton et al. 2012 (doi 10.1029/2011JF002055) found to agree with blocks in a tank. A berg
-that tapers, or has a foot, is another body: for it the number is a first look. Bass shows how much the shape under water
-matters.
+the hydrostatic criterion that Burton et al. 2012 (doi 10.1029/2011JF002055) found to agree with blocks in a tank. A
+berg that tapers, or has a foot, is another body: for it the number is a first look.
 """
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 """What a start and a slack line do to the tension, and the ramp that keeps a start below a load.
 
 Two masses on an elastic line move as one, m = a b/(a + b), on a spring, m x'' + k x = S, with x the stretch and S the
-tension that the outer forces hold in the end; a line whose far end is led has the mass of the berg. Without damping, and
-with forces that do not change while the line swings: upper bounds of what a line with damping bears. k = EA/L; of a line
-with weight this is its stiffest. Added mass counts as mass.
+tension that the outer forces hold in the end; a line whose far end is led has the mass of the berg. Without damping,
+and with forces that do not change while the line swings: upper bounds of what a line with damping bears. k = EA/L,
+which a line with weight comes up to as it is pulled straight. Added mass counts as mass.
 """
 from __future__ import annotations
 
@@ -73,30 +73,44 @@ def swing_after(ramp: float, speed: float, stiffness: float, mass: float) -> flo
 
 
 def start_load(ramp: float, speed: float, stiffness: float, mass: float, resistance: float = 0.0) -> float:
-    """Largest tension of a start from a taut line without tension, N. During the ramp the tension swings between 0 and
-    2 m v/T, which it reaches when the ramp lasts half a period; a shorter one leaves swing_after. The resistance of the
-    body (N, that of the full speed) comes on top of it: no less, since it grows with the speed."""
+    """Largest tension of a start from a taut line without tension, N, of a body that a constant resistance R (N) holds
+    until the line pulls as hard. One that grows with the speed, and is R at the full speed, loads the line no more:
+    while the berg gathers way it is below both R and the pull. With a = v/T the acceleration of the led end:
+
+        v0 = √(2 a R/k)                       its speed when the berg begins to move
+        F = R + m a + √((m a)² + k m v0²)     when the swing reaches this within the ramp
+        F = R + √(k² x² + k m v1²)            of the stretch x beyond R/k and its rate v1 at the end of a shorter one
+
+    without R 2 m a for ramps of half a period and more, swing_after for shorter ones; without a ramp R + m v ω.
+    """
     not_below_zero(ramp=ramp, speed=speed, resistance=resistance)
     omega = _frequency(stiffness, mass)
-    short = omega * ramp < math.pi
-    return resistance + (swing_after(ramp, speed, stiffness, mass) if short else 2 * mass * speed / ramp)
+    begins = math.sqrt(2 * resistance * ramp / (stiffness * speed)) if speed > 0 else 0.0
+    if ramp <= begins or speed == 0:
+        return resistance + mass * speed * omega
+    acceleration = speed / ramp
+    offset, rate = acceleration / omega ** 2, acceleration * begins / omega  # x = offset (1 − cos ωt) + rate sin ωt
+    phase = omega * (ramp - begins)
+    if phase >= math.pi - math.atan2(rate, offset):
+        return resistance + stiffness * (offset + math.hypot(offset, rate))
+    stretch = offset * (1 - math.cos(phase)) + rate * math.sin(phase)
+    return resistance + stiffness * math.hypot(stretch, offset * math.sin(phase) + rate * math.cos(phase))
 
 
 def ramp_for(load: float, speed: float, stiffness: float, mass: float, resistance: float = 0.0) -> float:
     """Shortest ramp, s, of a start with at most this load, the inverse of start_load, which falls as the ramp grows;
-    inf where the resistance alone is as large."""
+    0 where a start without a ramp bears no more, inf where the resistance alone is as large."""
     above_zero(load=load)
     not_below_zero(speed=speed, resistance=resistance)
-    omega = _frequency(stiffness, mass)
-    room, jerk = load - resistance, mass * speed * omega
-    if room <= 0:
-        return math.inf if resistance > load or speed > 0 else 0.0
-    if room >= jerk:
+    room = load - resistance
+    if start_load(0, speed, stiffness, mass, resistance) <= load:
         return 0.0
-    if room <= jerk * 2 / math.pi:
-        return 2 * mass * speed / room
-    low, high = 0.0, 0.5 * math.pi  # sin x / x = room / jerk
-    for _ in range(100):
+    if room <= 0:
+        return math.inf
+    low, high = 0.0, 2 * mass * speed * load / room ** 2  # where R + m a + √((m a)² + 2 m a R) is the load
+    for _ in range(200):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if math.sin(middle) / middle > room / jerk else (low, middle)
-    return 2 * high / omega
+        if middle in (low, high):
+            break
+        low, high = (middle, high) if start_load(middle, speed, stiffness, mass, resistance) > load else (low, middle)
+    return high

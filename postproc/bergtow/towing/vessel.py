@@ -123,8 +123,8 @@ class IceResistance:
 
 def ice_resistance(beam: float, thickness: float, concentration: float, speed: float,
                    ice_density: float = 910.0) -> IceResistance:
-    """A ship through pack ice, by the regression of the estimate ships_in_pack_ice. The source gives no range of ice
-    and speed, and the bows differ by a factor of more than ten at a knot: an order of magnitude, not a resistance."""
+    """A ship through pack ice, by the regression of ships that the estimates have, too. The source gives no range of
+    ice and speed, and the hulls differ by a factor of more than ten at a knot: an order of magnitude."""
     above_zero(beam=beam, ice_density=ice_density)
     not_below_zero(thickness=thickness, speed=speed)
     if not 0 <= concentration <= 1:
