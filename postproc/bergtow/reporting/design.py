@@ -417,8 +417,8 @@ def planned(a, case, found, began):
     n = max(1, len(a.concentrations)) * max(1, len(a.by_speed))
     end = ending(a, began, n)
     plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
-    if np.isfinite(end):
-        end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"]) * (not a.no_load_cases)
+    if np.isfinite(end) and not a.no_load_cases:
+        end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"])
         plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     print(answer_text.plan(plan), flush=True)
     return Work(program_path(), a.output, a.set, a.jobs, end, a.quiet), plan | {"speed_m_s": found["speed"]}

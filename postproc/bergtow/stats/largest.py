@@ -3,8 +3,8 @@
 
 The largest values of n tows in fields of their own are independent and alike. Whatever their distribution F, as long as
 it is continuous, the chance that all n stay below its quantile of the share p is p^n. So with confidence 1 - p^n at
-least the share p of all tows of that length stay below the largest of the n, and the next tow does so with probability n / (n + 1).
-Rejected: a normal quantile of the n values, which is narrower, but assumes what nobody has looked at.
+least the share p of all tows of that length stay below the largest of the n, and the next tow does so with probability
+n / (n + 1). Rejected: a normal quantile of the n values, which is narrower, but assumes what nobody has looked at.
 """
 import math
 

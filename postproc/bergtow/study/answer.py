@@ -31,8 +31,8 @@ import numpy as np
 
 FORMAT = 1
 HALF = 0.5               # of a run is its window, where the case does not say where that begins: assumed
-#: parts of a mean tow force: name, key of the summary
-PARTS = (("ice", "mean_ice_resistance_n"), ("water", "estimates_open_water_drag_force_n"), ("wind", None),
+#: parts of a mean tow force: name, key of the summary; None: parts of the drag
+PARTS = (("ice", "mean_ice_resistance_n"), ("water", None), ("wind", None),
          ("coriolis", "mean_coriolis_force_n"), ("slope", "mean_tilt_force_n"), ("inertia", "mean_inertia_force_n"))
 BEND = 30.0                            # degrees, of the course change, assumed
 
@@ -103,14 +103,21 @@ def value_of(e, c, found, fields, some):
     return {"kind": "largest_of_n", **largest, "reason": "no_tail"}
 
 
-def parts_of(e, rows, value):
-    """Mean forces along the tow that its value is made of, with their shares; what the value has above their sum is the
-    fluctuation. The drag of wind is the whole drag less that of the water."""
+def windy(case):
+    """Is there wind in a case, {key: text}?"""
+    return case.get("air.wind_table", "none") != "none" or any(case_value(case, f"air.wind_{k}", 0.0) for k in "xy")
+
+
+def parts_of(e, rows, value, wind):
+    """Mean forces along the tow that its value is made of, {part: N}; what the value has above their sum is the
+    fluctuation. wind: there is some; its drag is the whole drag less that of the water."""
     def mean(key):
         x = e.summary.get(key, np.full(e.n, np.nan))[rows]
         return float(np.nanmean(x)) if np.isfinite(x).any() else 0.0
-    drag, water = mean("mean_drag_force_n"), mean("estimates_open_water_drag_force_n")
-    out = {name: drag - water if name == "wind" else mean(key) for name, key in PARTS}
+    drag = mean("mean_drag_force_n")
+    water = mean("estimates_open_water_drag_force_n") if wind else drag
+    out = {name: {"water": water, "wind": drag - water}[name] if key is None else mean(key)
+           for name, key in PARTS}
     out["fluctuation"] = value - sum(out.values()) if np.isfinite(value) else np.nan
     return out
 
@@ -124,7 +131,8 @@ def condition(e, c, k, o):
     means = means[np.isfinite(means)]
     constant = float(means.mean()) if "tow_force" in why and len(means) else None
     value = value_of(e, c, found, tow[1] if tow else [], constant)
-    parts, name = parts_of(e, c.finished, value["n"]), f"steady.{k + 1}"
+    name = f"steady.{k + 1}"
+    parts = parts_of(e, c.finished, value["n"], windy(case_of(e, {"id": name})))
     start = found and found["start_up"]
     hours = sum(f["hours"] for f in tow[1]) if tow else 0.0
     return {

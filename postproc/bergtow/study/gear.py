@@ -91,7 +91,7 @@ def line(text, case, library=None):
 
 
 def needed_pull(v, load, speed, efficiency, own=0.0):
-    """Bollard pull, N, for a tow force at a speed; inf at the free-running speed and beyond. What is not finite stays."""
+    """Bollard pull, N, for a tow force at a speed; inf from the free-running speed on. What is not finite stays."""
     if not np.isfinite(load):
         return load
     return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
@@ -99,7 +99,8 @@ def needed_pull(v, load, speed, efficiency, own=0.0):
 
 def pull_at(v, speed, efficiency, own=0.0):
     """What the vessel pulls with at a speed, N; NaN without a vessel."""
-    return max(0.0, efficiency * v.pull * towing.pull_share(speed, v.free_speed) - own)
+    left = efficiency * v.pull * towing.pull_share(speed, v.free_speed) - own
+    return left if not left < 0 else 0.0
 
 
 def verdict(load, interval, has):

@@ -6,8 +6,8 @@ With M the mass of the body with that of the water that it carries, V the speed,
 the mean ice resistance, F the design value of the steady tow, k = EA/L of the line:
 
     start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
-                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that ramp, and
-                     with shorter ones as long as these hold, show what the ice makes of it
+                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that
+                     ramp, and with shorter ones as long as these hold, show what the ice makes of it
     course change    along the course as in runs through a bend of radius r, across it M V^2/r: the root of the squares
     stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
     loss of thrust   the body goes on by  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if ice and water
@@ -301,7 +301,8 @@ def changed(t, base, other):
 
 
 def head_sea(t, runs, current=None, wind=None):
-    """Current and wind against the tow, m/s, on the fields of the base; None: assumed, at model scale by Froude's law."""
+    """Current and wind against the tow, m/s, on the fields of the base. Where both are None they are assumed, at model
+    scale by Froude's law."""
     given = current is not None or wind is not None
     current, wind = (x if x is not None else 0.0 if given else y / t.slower
                      for x, y in ((current, HEAD_CURRENT), (wind, HEAD_WIND)))

@@ -3,7 +3,7 @@
 back from answer.json, where what is not finite is None."""
 import math
 
-from bergtow.table import designed, level, number, short, table
+from bergtow.table import designed, number, short, table
 
 KNOT = 1852 / 3600
 TONNE = 9806.65
@@ -153,8 +153,8 @@ def _beside(v, a):
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
-WORDS = {"beside": _beside, "needs": _needs, "needs_largest": _largest, "needs_at_least": _at_least, "band": _band, "vessel": _vessel,
-         "line": _line, "feasible": _feasible, "start": _start,
+WORDS = {"beside": _beside, "needs": _needs, "needs_largest": _largest, "needs_at_least": _at_least, "band": _band,
+         "vessel": _vessel, "line": _line, "feasible": _feasible, "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
 
@@ -198,8 +198,8 @@ def _behind(row):
 
 def load_cases(a, markdown):
     top = (a["design"] or {}).get("row")
-    rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]), ends(c["interval_95"]) or "–",
-             KINDS[c["kind"]], {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
+    rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
+             ends(c["interval_95"]) or "–", KINDS[c["kind"]], {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
                                 "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
     return table(["load case", "kN", "95 % of the fields", "kind", "by", "with"], rows, markdown) + \
         ("\n\n* design value" if top else "") + \
