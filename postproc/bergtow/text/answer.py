@@ -199,8 +199,9 @@ def _behind(row):
 def load_cases(a, markdown):
     top = (a["design"] or {}).get("row")
     rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
-             ends(c["interval_95"]) or "–", KINDS[c["kind"]], {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
-                                "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
+             ends(c["interval_95"]) or "–", KINDS[c["kind"]],
+             {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
+              "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
     return table(["load case", "kN", "95 % of the fields", "kind", "by", "with"], rows, markdown) + \
         ("\n\n* design value" if top else "") + \
         ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "")
