@@ -260,7 +260,7 @@ def made(tmp_path_factory):
     patch.setenv("BERGTOW", str(BERGTOW))
     patch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     found = bergtow.design(folder / "case.yml", folder / "out", fields=3, vessel="0.001 t", line="150 N", line_factor=2,
-                           no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s", bend_radius=1,
+                           line_length=3, no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s", bend_radius=1,
                            head_wind=1)
     patch.undo()
     return found
@@ -335,6 +335,8 @@ def test_the_fall_back_is_named(made):
     assert value["kind"] in ("largest_of_n", "return_level")
     if value["kind"] == "largest_of_n":
         assert value["n_tows"] == 3 and value["share_below"] == pytest.approx(0.05 ** (1 / 3))
+        said = [part for part in made["sentence"] if part["code"] == "covers"]
+        assert len(said) == 1 and said[0]["rows"] == ["steady.1"] and "37 % of such tows" in words.sentence(made)
 
 
 def test_a_load_without_a_bound_is_at_least(tmp_path):

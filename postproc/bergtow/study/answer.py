@@ -254,9 +254,11 @@ def sentence(a):
     rows = {row["id"]: row for row in a["load_cases"] + a["conditions"]}
     case = rows[d["row"]]
     out.append({"code": {"at_least": "needs_at_least", "largest_of_n": "needs_largest"}.get(d["kind"], "needs"),
-                "values": {k: d.get(k) for k in ("n", "interval_95", "kind")} | {"case": d["row"]}
-                | {k: (d.get("value") or {}).get(k) for k in ("n_tows", "share_below", "hours_each", "reason")},
+                "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
                 "rows": ["design", d["row"]]})
+    steady = rows[rows["case.steady"]["of"]]
+    if steady["value"]["kind"] == "largest_of_n":
+        out.append({"code": "covers", "values": steady["value"], "rows": [steady["id"]]})
     if case.get("of"):
         out.append({"code": "band", "values": a["band"], "rows": ["band"] + [r["id"] for r in a["assumed"]]})
     out.append({"code": "vessel", "values": {k: v[k] for k in ("needed_bollard_pull_n", "speed_m_s", "efficiency",
@@ -281,7 +283,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
     hold = max(some, key=lambda c: c["n"], default=None)
     design = top and {"id": "design", "row": top["id"], **{k: top[k] for k in ("n", "kind", "interval_95", "reason")},
-                      "value": worst["value"] if top["id"] == "case.steady" else top["values"]}
+                      "value": worst["value"] if top["id"] == "case.steady" else None}
     found = [r for r in ranges if r["reason"] is None]
     band = {"id": "band", "low_n": None, "high_n": None, "combined_95": None, "why_not_combined": "no_range",
             "without": [r["key"] for r in ranges if r["reason"]]}

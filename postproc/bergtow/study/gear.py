@@ -75,11 +75,12 @@ def vessel(text, case, library=None):
                   "library" if known else free_from, found.beam, found.mass if np.isfinite(found.mass) else mass)
 
 
-def line(text, case, library=None):
-    """The line of the call (text or None), or that of the case. Errors: BergtowError."""
+def line(text, case, library=None, own_length=None):
+    """The line of the call (text or None), or that of the case; own_length, m, in place of the case's. Errors:
+    BergtowError."""
     there = case.get("tow.mode") in ("line", "thrust")
     number = lambda key: case_value(case, key, np.nan) if there else np.nan
-    length, stiffness = number("tow.line_length"), number("tow.line_stiffness")
+    length, stiffness = own_length or number("tow.line_length"), number("tow.line_stiffness")
     if text is None:
         load = number("tow.line.breaking_load")
         return Line("case" if there else "", load if load > 0 else np.nan, stiffness, length)

@@ -86,12 +86,14 @@ def _needs(v, a):
 
 
 def _largest(v, a):
-    out = f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v)}"
-    if not known(v["share_below"]):
-        return out
-    return (f"{out}, in {v['n_tows']} tows of {short(60 * v['hours_each'], 2)} min: too few peaks for a tail. With "
-            f"95 % confidence {percent(v['share_below'])} of tows of this length stay below it, whatever the "
-            f"distribution; a tow of {short(a['asked']['tow_hours'], 2)} h bears more")
+    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v)}"
+
+
+def _covers(v, a):
+    return (f"There are too few peaks for a tail: the largest of {v['n_tows']} steady tows of "
+            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence {percent(v['share_below'])} "
+            f"of such tows stay below it, whatever the distribution, and a tow of {short(a['asked']['tow_hours'], 2)} h "
+            "bears more")
 
 
 def _at_least(v, a):
@@ -153,8 +155,8 @@ def _beside(v, a):
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
-WORDS = {"beside": _beside, "needs": _needs, "needs_largest": _largest, "needs_at_least": _at_least, "band": _band,
-         "vessel": _vessel, "line": _line, "feasible": _feasible, "start": _start,
+WORDS = {"beside": _beside, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+         "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible, "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
 
