@@ -260,8 +260,8 @@ def made(tmp_path_factory):
     patch.setenv("BERGTOW", str(BERGTOW))
     patch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     found = bergtow.design(folder / "case.yml", folder / "out", fields=3, vessel="0.001 t", line="150 N", line_factor=2,
-                           line_length=3, no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s", bend_radius=1,
-                           head_wind=1)
+                           line_length=3, no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s",
+                           bend_radius=1, head_wind=1)
     patch.undo()
     return found
 
@@ -361,3 +361,24 @@ def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):
     assert p["needs_fields"] == math.ceil(3600 * p["needs_hours"] / 30)
     assert answer.plan(BERGTOW, path, [], 1, 2, np.inf, 9)["budget_fields"] == 9
     assert json.dumps(p) and "A design value takes some" in words.plan(p)
+
+
+@pytest.mark.slow
+def test_intervals_from_eight_fields_hold_the_mean_of_two_hundred(tmp_path):
+    """200 fields of a cheap case stand for the truth; eight of them are drawn 500 times. The interval of their mean
+    holds that of all, and the largest of the eight is above the share of tows that it claims."""
+    write_case(tmp_path, changed(TOW, run={"dt": 0.2, "duration": 20}, domain={"length": 12, "width": 7},
+                                 ice__concentration=0.5, output__window_start=6))
+    (tmp_path / "study.yml").write_text("base: case.yml\nrepeats: 200\nseed: 7\n")
+    made = call("ensemble", tmp_path / "study.yml", "-o", tmp_path / "all", "--threads", 1, "--jobs", 2, "--quiet",
+                timeout=1200)
+    assert made.returncode == 0, made.stderr
+    e, rng = Members(tmp_path / "all"), np.random.default_rng(8)
+    means = e.summary["mean_tow_force_n"]
+    assert len(means) == 200 and np.isfinite(means).all()
+    drawn = np.array([rng.choice(200, 8, replace=False) for _ in range(500)]).T
+    low, high = stat_mean.t_interval(means[drawn])
+    assert 0.90 <= np.mean((low <= means.mean()) & (means.mean() <= high)) <= 0.98
+    peak = e.summary["peak_tow_force_n"]
+    below = np.searchsorted(np.sort(peak), peak[drawn].max(axis=0), side="right") / 200
+    assert 0.90 <= np.mean(below >= largest.share_below(8)) <= 0.98

@@ -361,8 +361,8 @@ def options(p):
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
     p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
-    p.add_argument("--line-length", type=above_zero, metavar="M", help="its length, for snap loads (default: that of the "
-                   "case)")
+    p.add_argument("--line-length", type=above_zero, metavar="M", help="its length, for snap loads (default: that of "
+                   "the case)")
     p.add_argument("--line-factor", type=above_zero, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
     p.add_argument("--efficiency", type=share_of_one, default=1.0, metavar="X", help="share of the bollard pull that "

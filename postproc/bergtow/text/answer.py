@@ -91,9 +91,9 @@ def _largest(v, a):
 
 def _covers(v, a):
     return (f"There are too few peaks for a tail: the largest of {v['n_tows']} steady tows of "
-            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence {percent(v['share_below'])} "
-            f"of such tows stay below it, whatever the distribution, and a tow of {short(a['asked']['tow_hours'], 2)} h "
-            "bears more")
+            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence "
+            f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
+            f"{short(a['asked']['tow_hours'], 2)} h bears more")
 
 
 def _at_least(v, a):
@@ -156,7 +156,8 @@ def _beside(v, a):
 
 
 WORDS = {"beside": _beside, "covers": _covers, "needs": _needs, "needs_largest": _largest,
-         "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible, "start": _start,
+         "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
+         "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
 
