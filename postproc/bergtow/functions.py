@@ -248,8 +248,9 @@ def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **opti
     return _found("capability", case, out, options)
 
 
-def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> Path:
-    """From a case or a study to the report of the design tow force; returns the path of OUT/report.html. options: those
-    of `bergtow design`, as budget=14, no_pdf=True."""
+def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+    """What a tow asks for: tow force with interval or named fall-back, load cases, ramp, vessel, line, speeds, as a
+    dictionary as OUT/answer.json has it; OUT/report.html is its page. options: those of `bergtow design`, as budget=14,
+    vessel="110 t", speeds="0.8 kn,1.3 kn", no_pdf=True."""
     _perform("design", case, "-o", out, *_words(options))
-    return Path(out) / "report.html"
+    return json.loads((Path(out) / "answer.json").read_text(encoding="utf-8"))

@@ -49,7 +49,7 @@ CALLS = [
     ("capability", ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
     ("outlines", ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
      ["a.geojson", "a.json", "a.png"]),
-    ("design", ["case.yml", "-o", "."], ["design.yml", "report.html", "report.pdf", "replay.html"]),
+    ("design", ["case.yml", "-o", "."], ["answer.json", "design.yml", "report.html", "report.pdf", "replay.html"]),
 ]
 WRITE_NOTHING = {"contents"}
 SLOW = ("budget", "capability", "design")  # refused before any work; that they replace their own their tests show

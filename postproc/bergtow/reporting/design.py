@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""From a case or a study to the report of the design tow force, as a page and as PDF.
+"""From a case or a study to the answer of what a tow asks for, and to its report as a page and as PDF.
 
-    bergtow design CASE.yml -o DIR --budget 14      DIR/design.yml, the ensemble, report.html, report.pdf, replay.html
-    bergtow design STUDY.yml -o DIR                 the same of a study, with the fields that it asks for
+    bergtow design CASE.yml -o DIR --vessel "110 t"   DIR/design.yml, the ensemble, answer.json, report.html, report.pdf
+    bergtow design STUDY.yml -o DIR                   the same of a study, with the fields that it asks for
 
-Of a case a study is made: over concentrations, with as many fields of each as the budget allows. Two fields of each
+Of a case a study is made: of its concentration, or of several, and of several speeds where they are asked for, with as
+many fields of each as the budget allows. A tow at another speed goes as far as that of the case. Two fields of each
 condition are run, then as many as fit into what is left, by the time which these took; members go field by field, so
 conditions have equally many, and should the time run out all the same, the fields that are complete in every condition
 are taken. Members are independent: one process of one thread a core. The same call goes on where an earlier one ended.
+
+Of the budget CASES_SHARE at most is kept for the runs of load cases and ranges (study/load_cases.py, assumed.py),
+which are of the hardest condition at the speed that is asked for. A row that the budget does not reach has no load, and
+says so.
 
 Where the domain of the case is too narrow for a concentration by the rule of `bergtow check`, that condition gets the
 width that the rule asks for: a load that rests on the periodic images of the body is none to design for. Walls are part
 of the question, and are left where they are.
 """
 import argparse
+import ctypes
+import math
 import os
 import re
 import subprocess
@@ -23,25 +30,25 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import _library, arguments, writing
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, at_least_one
-from bergtow.errors import SIGNAL, RunError
+from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero, share
+from bergtow.errors import CASE, SIGNAL, BergtowError, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
 from bergtow.result.members import FINISHED, WAITING, Members
 from bergtow.result.origins import TITLE_BLOCK
 from bergtow.result.run import Run
-from bergtow.study import analysis, domain_width
+from bergtow.study import analysis, answer, assumed, domain_width, gear, load_cases
 from bergtow.study.case_file import contents, files, is_study, says, section
 from bergtow.study.domain_width import read_ice_of, reads_ice
-from bergtow.study.runs import checked, run_members
+from bergtow.study.runs import CaseRuns, locked, run_members
+from bergtow.text import answer as answer_text
 
 import numpy as np
 import yaml
 
 BUDGET = 14.0                # min
-CONCENTRATIONS = "0.6,0.7,0.8,0.9"
 MOST_FIELDS = 40
 RESERVE = 30.0, 10.0         # s of the budget for pages, and for the statistics of each condition
 MARGIN = 0.95                # of what is left is given to fields
@@ -49,6 +56,9 @@ FIRST = 2                    # fields by which it is measured how long one takes
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
 FEW = 5                      # fields below which nothing is known of the scatter between them
+CASES_SHARE, CASE_RUNS = 0.4, 34  # of the budget for load cases and ranges, at most, and how many runs these are
+SLOWER = 1.6                 # a run / the program's own estimate of it: where the first fields are still to come
+PAIRED, OF_A_CASE = 4, 2     # fields: paired with those of the case as it is, and of other load cases
 
 
 @dataclass
@@ -84,21 +94,42 @@ def widths(work, a, case):
     if a.keep_width or domain_width.stays(case, [text.split("=")[0].strip() for text in a.set]):
         return {}
     found = {c: domain_width.needed(work.program, a.file, [*a.set, f"ice.concentration={c!r}"])
-             for c in a.concentrations}
+             for c in a.concentrations or []}
     return {c: width for c, width in found.items() if width}
+
+
+def at_speeds(a, found):
+    """({text of a speed: keys that go with it} of the study, empty for one speed). found: answer.case_numbers(). A tow
+    at another speed goes as far as that of the case, and its window begins as far on. Errors: RunError."""
+    own = found["speed"]
+    some = sorted({own, *a.speeds})
+    if len(some) == 1 or not a.speeds:
+        return {}
+    if found["case"].get("tow.programme", "none") != "none":
+        raise RunError(a.file, "has a tow.programme, which no speed changes", "leave --speeds or tow.programme out",
+                       CASE)
+    out = {}
+    for v in some:
+        keys = {"run.duration": f"{found['duration'] * own / v:.9g} s"}
+        if found["window_start"] >= 0:
+            keys["output.window_start"] = f"{found['window_start'] * own / v:.9g} s"
+        out[f"{v:.9g} m/s"] = {} if v == own else keys
+    return out
 
 
 def write_study(a, case, repeats, wider):
     """The study of a case: DIR/design.yml. wider: domain.width by concentration, as of widths. Errors: RunError."""
-    values = [] if reads_ice(case) else a.concentrations
+    values = [] if reads_ice(case) else a.concentrations or []
     study = {
         "title": a.title or title_of(case, a.file.stem, values),
         "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed
     }
-    if values:
-        study["parameters"] = {"ice.concentration": values}
-    if wider:
-        study["with"] = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
+    parameters = {"ice.concentration": values} if values else {}
+    fitting = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
+    if a.by_speed:
+        parameters["tow.speed"] = list(a.by_speed)
+        fitting |= {f"tow.speed={text}": keys for text, keys in a.by_speed.items() if keys}
+    study |= {name: some for name, some in (("parameters", parameters), ("with", fitting)) if some}
     if says(case, "output", "panels") is None and says(case, "tow", "mode") != "none":
         study["set"] = {"output.panels": True}
     path = a.output / "design.yml"
@@ -151,14 +182,15 @@ def run_case(work, a, case):
               "fields")
         a.fields = 1
     n = min(max(FIRST, fields_settled(a.output)), a.fields)
-    wider = widths(work, a, case)
+    wider = a.wider = widths(work, a, case)
     for c, width in wider.items():
         print(f"at {100 * c:g} % the domain is made {width} wide: narrower, its periodic images would carry part "
               "of the load (--keep-width: leave it as it is)")
     whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_settled(a.output) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
-                       "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
+                       f"raise --budget to {math.ceil(2 * a.budget)}; what was begun is kept, and the same call goes "
+                       "on", SIGNAL)
     rate = seconds_a_field(Members(a.output)) / work.jobs
     replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Members(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
@@ -179,8 +211,7 @@ def run_case(work, a, case):
     if n < min(FEW, a.fields):
         need = a.budget + max(0.0, (FEW - n) * rate - max(0.0, end - time.monotonic())) / 60
         print(f"bergtow design: warning: {n} fields say nothing of the scatter between them; {FEW} need some "
-              f"{need:.0f} min "
-              "(--budget), or a shorter run (--set run.duration=1h)", file=sys.stderr)
+              f"{math.floor(need) + 1} min: --budget {math.floor(need) + 1}", file=sys.stderr)
 
 
 def hardest(e):
@@ -220,24 +251,136 @@ def make_replay(work, a, left):
             report.write(Path(folder), [a.output / "replay.html"], force=a.force)
 
 
+# ---- load cases and ranges
+
+
+def beside(work, a, row, t, minutes):
+    """(load cases without the steady one, ramp, ranges, how many runs): of a condition. Errors: RunError."""
+    ice = row["values"].get("ice.concentration")
+    given = list(a.set)
+    if ice is not None:
+        given.append(f"ice.concentration={ice!r}")
+        given += [f"domain.width={width}" for c, width in a.wider.items() if c == ice]
+    some = assumed.applies(a.assumed, lambda key, default: answer.case_value(t.case, key, default),
+                           abs(t.wind) > load_cases.NO_WIND * abs(t.value))
+    end = time.monotonic() + 60 * minutes
+    with locked(a.output / "load-cases") as lock:
+        n = (1, 1) if read_ice_of(t.case) else (PAIRED, OF_A_CASE)
+        runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
+                                        lock=lock), *map(range, n), a.no_load_cases)
+        def say(words):
+            if not a.quiet:
+                print(words, flush=True)
+        start, ramp = load_cases.start(t, runs, say)
+        cases = [start, load_cases.head_sea(t, runs, a.head_current, a.head_wind),
+                 load_cases.course_change(t, runs, a.bend, a.bend_radius), load_cases.stop(t),
+                 load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
+        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+    return cases, ramp, ranges, runs.count
+
+
+def named(a, case):
+    """(vessel, line) of the call, or of the case. Errors: BergtowError."""
+    return gear.vessel(a.vessel, case, a.vessels), gear.line(a.line, case, a.lines, a.line_length)
+
+
+def answer_of(work, a, plan, began):
+    """answer.json of what the folder holds, and the answer. Errors: RunError."""
+    spent = time.monotonic()
+    e = Members(a.output)
+    rows = answer.conditions(e)
+    first = next((r for r in rows if np.isfinite(r["speed_m_s"])), rows[0])
+    asked_speed = plan and plan["speed_m_s"] or first["speed_m_s"]
+    row = answer.hardest(rows, asked_speed)
+    case = answer.case_of(e, row or first)
+    vessel, line = named(a, case)
+    t = answer.tow_of(e, row, line, vessel) if row else None
+    cases, ramp, ranges, count = ([], None, [], 0)
+    if t is not None and plan is not None:
+        left = (began + 60 * a.budget - RESERVE[0] - time.monotonic()) / 60 if a.budget else np.inf
+        cases, ramp, ranges, count = beside(work, a, row, t, left)
+    now = time.monotonic()
+    asked = {"concentrations": sorted({round(r["concentration"], 6) for r in rows}), "speed_m_s": asked_speed,
+             "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "vessel": a.vessel, "line": a.line,
+             "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
+             "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
+             "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
+    cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - spent, "case_runs": count}
+    found = writing.plain(answer.of(asked, plan, rows, cases, ramp, ranges, vessel, t, cost, title=e.title,
+                                    case=str(a.file), report="report.html", warnings=[]))
+    writing.write_json(found, a.output / "answer.json", a.force)
+    print(f"\n{answer_text.text(found)}\n")
+    for remark in answer_text.remarks(found):
+        print(f"note: {remark}")
+    print(a.output / "answer.json")
+
+
+# ---- command line
+
+
 def concentrations(text):
     try:
         values = sorted({float(part) for part in text.split(",")})
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: give numbers with commas, as in {CONCENTRATIONS}") from None
+        raise argparse.ArgumentTypeError(f"{text}: give numbers with commas, as in 0.6,0.8") from None
     if not all(0 <= v <= 0.95 for v in values):
         raise argparse.ArgumentTypeError(f"{text}: concentrations are 0 to 0.95")
     return values
 
 
+def speed(text):
+    value = ctypes.c_double()
+    try:
+        _library.library().bt_number_read(text.strip().encode(), b"m/s", ctypes.byref(value))
+    except BergtowError:
+        raise argparse.ArgumentTypeError(f"{text}: give speeds as in 0.8 kn,1 kn or 0.8 kn:1.4 kn:4") from None
+    if not 0 < value.value < np.inf:
+        raise argparse.ArgumentTypeError(f"{text}: speeds are above zero")
+    return value.value
+
+
+def speeds(text):
+    """"0.8 kn,1 kn", or "0.8 kn:1.4 kn:4", four from the one to the other: [m/s]"""
+    if text.count(":") == 2:
+        first, last, n = text.split(":")
+        if not n.strip().isdecimal() or int(n) < 2:
+            raise argparse.ArgumentTypeError(f"{text}: {n} is no number of speeds; give 2 or more")
+        return np.linspace(speed(first), speed(last), int(n)).tolist()
+    return [speed(part) for part in text.split(",")]
+
+
 def options(p):
+    p.set_defaults(by_speed={})
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
                    "where an earlier one ended")
     p.add_argument("--budget", type=above_zero, metavar="MIN",
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
-    p.add_argument("--concentrations", type=concentrations, metavar="A,...", default=concentrations(CONCENTRATIONS),
-                   help=f"of a case (default: {CONCENTRATIONS})")
+    p.add_argument("--concentrations", type=concentrations, metavar="A,...", help="of a case (default: its own)")
+    p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
+                   "\"0.8 kn,1.3 kn\", or FROM:TO:N")
+    p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
+    p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
+    p.add_argument("--line-length", type=above_zero, metavar="M", help="its length, for snap loads (default: that of "
+                   "the case)")
+    p.add_argument("--line-factor", type=above_zero, metavar="X", help="safety factor of the line (default: none is "
+                   "applied)")
+    p.add_argument("--efficiency", type=share_of_one, default=1.0, metavar="X", help="share of the bollard pull that "
+                   "the vessel tows with in the weather (default: 1)")
+    for kind in ("vessels", "lines"):
+        p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
+    p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
+                   "parameters of a study (default: a few with their sources)")
+    p.add_argument("--head-current", type=not_below_zero, metavar="V", help="against the tow, m/s, in the load case "
+                   f"with head current and wind (default: {load_cases.HEAD_CURRENT:g}, assumed, and then not in the "
+                   "design value)")
+    p.add_argument("--head-wind", type=not_below_zero, metavar="V", help="the same of the wind, m/s (default: "
+                   f"{load_cases.HEAD_WIND:g})")
+    p.add_argument("--bend", type=finite, default=answer.BEND, metavar="DEG", help="angle of the course change, "
+                   "degrees (default: %(default)s, assumed)")
+    p.add_argument("--bend-radius", type=above_zero, metavar="M", help="its radius, m (default: ten body lengths, "
+                   "assumed)")
+    p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms alone")
     domain_width.add_option(p)
     p.add_argument("--fields", type=at_least_one, default=MOST_FIELDS, metavar="N",
                    help="of a case: at most so many of each condition (default: %(default)s)")
@@ -257,6 +400,32 @@ def options(p):
     arguments.add_force(p)
 
 
+def share_of_one(text):
+    return 1.0 if float(text) == 1 else share(text)
+
+
+def ending(a, began, conditions):
+    """When the runs are to end, by time.monotonic()."""
+    reserve = RESERVE[0] + RESERVE[1] * conditions
+    return began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
+
+
+def planned(a, case, found, began):
+    """(Work of the fields, plan): what a value takes and what the budget gives, said before the first run. Errors:
+    RunError."""
+    own = answer.case_value(found["case"], "ice.concentration", 0.0)
+    a.concentrations = a.concentrations or ([] if reads_ice(case) else [own])
+    a.by_speed = at_speeds(a, found)
+    n = max(1, len(a.concentrations)) * max(1, len(a.by_speed))
+    end = ending(a, began, n)
+    plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
+    if np.isfinite(end) and not a.no_load_cases:
+        end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"])
+        plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
+    print(answer_text.plan(plan), flush=True)
+    return Work(program_path(), a.output, a.set, a.jobs, end, a.quiet), plan | {"speed_m_s": found["speed"]}
+
+
 def perform(a):
     a.output, began = a.output or Path("out") / f"design-{a.file.stem}", time.monotonic()
     contents(a.file)  # there, and what can be read
@@ -267,19 +436,21 @@ def perform(a):
         pdf.browser()
     made = ["report.html"] + ["report.pdf"] * (not a.no_pdf)
     analysis.also(a.also)
-    for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
+    for name in ["answer.json", *made] + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         writing.may_write(a.output / name, a.force)
-    if not study:
-        checked(program_path(), a.file, a.set)
+    found = None if study else answer.case_numbers(program_path(), a.file, a.set)
+    named(a, found["case"] if found else {})  # refused now, and not after the runs
+    a.assumed = assumed.read(a.ranges) if a.ranges else assumed.RANGES
     a.output.mkdir(parents=True, exist_ok=True)
-    reserve = RESERVE[0] + RESERVE[1] * len(a.concentrations)
-    end = began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
-    work = Work(program_path(), a.output, a.set, a.jobs, end, a.quiet)
     if study:
+        work = Work(program_path(), a.output, a.set, a.jobs, ending(a, began, 1), a.quiet)
         work.ensemble(a.file)
+        plan = None
     else:
         layers = files(a.file)
+        work, plan = planned(a, {name: section(layers, name) for name in SECTIONS}, found, began)
         run_case(work, a, {name: section(layers, name) for name in SECTIONS})
+    answer_of(work, a, plan, began)
     if not a.no_replay:
         make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
     report.write(a.output, [a.output / name for name in made], {name: getattr(a, name) for name in TITLE_BLOCK}, a.also,

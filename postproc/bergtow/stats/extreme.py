@@ -157,15 +157,15 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
             return {
                 "refused": saturated(pooled, what) or
                            f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
-                           f"any threshold that half of them exceed at most; run longer, more fields, or a shorter "
-                           f"--gap"
+                           f"any threshold that half of them exceed at most; run longer, or more fields"
+                           + ("" if clusters_wanted else ", or `bergtow statistics` with a shorter --gap")
             }
     each = _excesses(fields, threshold, gap)
     excess, raw = np.concatenate(each), sum(int(np.sum(exceeds(f["peak"], threshold))) for f in fields)
     if len(excess) < LEAST_EXCESSES:
         return {
             "refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
-                       f"fields, or choose a lower --threshold"
+                       f"fields, or `bergtow statistics` with a lower --threshold"
         }
     if why := saturated(threshold + excess, "clusters"):
         return {"refused": why}
@@ -290,9 +290,10 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
     maxima = np.concatenate(each)
     empty = np.isnan(maxima)
     if len(maxima) < LEAST_BLOCKS:
-        return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
+        return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks (bergtow statistics)"}
     if empty.mean() > EMPTY:
-        return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without {what}; lower --blocks, or run longer"}
+        return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without {what}; lower --blocks (bergtow "
+                           "statistics), or run longer"}
     if why := saturated(maxima[~empty], "blocks"):
         return {"refused": why}
     value, same = commonest(maxima[~empty])

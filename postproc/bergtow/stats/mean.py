@@ -29,12 +29,12 @@ def series_mean(x):
 
 
 def t_interval(x, level=LEVEL):
-    """(low, high) of the mean of independent x; NaN for fewer than two."""
+    """(low, high) of the mean of independent x [n] or [n, ...], along the first axis; NaN for fewer than two."""
     n = len(x)
     if n < 2:
         return np.nan, np.nan
-    half = scipy.stats.t.ppf(0.5 + level / 2, n - 1) * np.std(x, ddof=1) / np.sqrt(n)
-    return np.mean(x) - half, np.mean(x) + half
+    half = scipy.stats.t.ppf(0.5 + level / 2, n - 1) * np.std(x, ddof=1, axis=0) / np.sqrt(n)
+    return np.mean(x, axis=0) - half, np.mean(x, axis=0) + half
 
 
 def mean_of_conditions(conditions, level=LEVEL):

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""The answer to a client's question, answer.json: tow force with interval or named fall-back, its parts, load cases,
+the band over what is assumed, ramp, vessel, line, speeds, and the sentence that is made of them.
+
+Codes and numbers in SI units; what they read like is in text/answer.py. Every number of the sentence names the id of
+the row that it is from. A value is, in this order,
+
+    return_level     the level of the stated probability, where a tail can be fitted
+    constant         a load that does not vary
+    at_least         the largest simulated, where a line parted or a step had no solution: nothing bounds it from above
+    largest_of_n     the largest of the n tows, distribution-free (stats/largest.py)
+    none             where no tow has a window
+"""
+import json
+import math
+from types import SimpleNamespace
+
+from bergtow import table
+from bergtow.result.members import FINISHED
+from bergtow.result.run import Run, case_value, parse_case
+from bergtow.stats import extreme as stat_extreme
+from bergtow.stats import largest as stat_largest
+from bergtow.stats import load as stat_load
+from bergtow.stats import loads as stat_loads
+from bergtow.stats import mean as stat_mean
+from bergtow.stats import profile as stat_profile
+from bergtow.study import assumed, gear, load_cases
+from bergtow.study.runs import checked
+
+import numpy as np
+
+FORMAT = 1
+HALF = 0.5               # of a run is its window, where the case does not say where that begins: assumed
+#: parts of a mean tow force: name, key of the summary; None: parts of the drag
+PARTS = (("ice", "mean_ice_resistance_n"), ("water", None), ("wind", None),
+         ("coriolis", "mean_coriolis_force_n"), ("slope", "mean_tilt_force_n"), ("inertia", "mean_inertia_force_n"))
+BEND = 30.0                            # degrees, of the course change, assumed
+
+
+# ---- before the first run
+
+
+def plan(program, path, given, conditions, jobs, minutes, most):
+    """What a design value needs, and what a budget gives. conditions: how many; minutes: for the fields, inf without a
+    budget; most: fields of a condition. Errors: RunError.
+
+    A fitted tail needs blocks, each stat_load.LEAST_GAPS times as long as what separates clusters, two correlation
+    times. Before any run that is taken as the time in which the body goes on by its own length and a floe's, when the
+    ice that it touches has become other ice: assumed, and told as such."""
+    found = json.loads(checked(program, path, given, "--json"))
+    values = case_numbers(program, path, given)
+    speed, slower = values["speed"], values["slower"]
+    duration, start = found["run"]["duration_s"], values["window_start"]
+    window = max(0.0, duration - start) if start >= 0 else HALF * duration
+    size = (found.get("ice") or {}).get("mean_size_m") or 0.0
+    gap = max((values["length"] + size) / speed if speed > 0 else 0.0, stat_loads.TIME_SCALE / slower)
+    hours = stat_extreme.LEAST_BLOCKS * stat_load.LEAST_GAPS * gap / 3600
+    needs = max(stat_profile.LEAST_FIELDS, math.ceil(3600 * hours / window)) if window > 0 else most + 1
+    core, rounds = found["cost"]["core_time_s"], conditions / jobs
+    gives = most if not np.isfinite(minutes) else min(most, int(60 * minutes / max(core * rounds, 1e-9)))
+    return {"needs_fields": needs, "needs_hours": hours, "needs_min": needs * core * rounds / 60,
+            "budget_fields": gives, "budget_hours": gives * window / 3600, "window_hours": window / 3600,
+            "core_s": core, "gap_s": gap, "conditions": conditions, "most_fields": most,
+            "gives": "return_level" if gives >= needs else "largest_of_n" if gives >= 1 else "nothing"}
+
+
+def case_numbers(program, path, given):
+    """Numbers of a case that no run is needed for."""
+    case = parse_case(checked(program, path, given, "--scale", "1"))
+    scale = case_value(case, "estimate.length_scale", 1.0)
+    return {"case": case, "speed": case_value(case, "tow.speed", 0.0), "slower": math.sqrt(scale) if scale > 0 else 1.0,
+            "window_start": case_value(case, "output.window_start", -1.0),
+            "length": case_value(case, "body.length", 0.0), "duration": case_value(case, "run.duration")}
+
+
+# ---- of the ensemble
+
+
+def options(**more):
+    """Those of the statistics of loads, as bergtow statistics has them."""
+    return SimpleNamespace(**({"time_scale": None, "tow_hours": None, "probability": stat_loads.PROBABILITY,
+                               "hours": [], "resamples": 1} | more))
+
+
+def value_of(e, c, found, fields, some):
+    """The value of a condition: see the head of this file. found: statistics of the tow force, None without one;
+    fields: of gather()."""
+    if found is None:
+        if some is not None:
+            return {"kind": "constant", "n": some}
+        return {"kind": "none", "n": np.nan, "reason": "no_window" if len(c.finished) else "no_member"}
+    rows = e.tows(c.members)
+    reason = "no_solution" if e.without_bound(c.members) else "line_parted" if stat_loads.tows_with(
+        e, rows, stat_loads.PARTED, stat_loads.ADRIFT) else None
+    if reason:
+        return {"kind": "at_least", "n": found["largest"], "reason": reason, "n_tows": len(rows)}
+    d = found["design"]
+    if "value" in d:
+        low, high = d["interval_95"]
+        return {"kind": "return_level", "n": d["value"], "interval_95": [low, table.bound(d["value"], high)],
+                "model": d["model"], "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
+    largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])
+    return {"kind": "largest_of_n", **largest, "reason": "no_tail"}
+
+
+def windy(case):
+    """Is there wind in a case, {key: text}?"""
+    return case.get("air.wind_table", "none") != "none" or any(case_value(case, f"air.wind_{k}", 0.0) for k in "xy")
+
+
+def parts_of(e, rows, value, wind):
+    """Mean forces along the tow that its value is made of, {part: N}; what the value has above their sum is the
+    fluctuation. wind: there is some; its drag is the whole drag less that of the water."""
+    def mean(key):
+        x = e.summary.get(key, np.full(e.n, np.nan))[rows]
+        return float(np.nanmean(x)) if np.isfinite(x).any() else 0.0
+    drag = mean("mean_drag_force_n")
+    water = mean("estimates_open_water_drag_force_n") if wind else drag
+    out = {name: {"water": water, "wind": drag - water}[name] if key is None else mean(key)
+           for name, key in PARTS}
+    out["fluctuation"] = value - sum(out.values()) if np.isfinite(value) else np.nan
+    return out
+
+
+def condition(e, c, k, o):
+    """The row of a steady tow."""
+    gathered, why = stat_loads.gather(e, c.finished, o) if len(c.finished) else ({}, {})
+    tow = gathered.get("tow_force")
+    found = stat_loads.statistics(e, c.finished, o, {"tow_force": tow})["tow_force"] if tow else None
+    means = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))[c.finished]
+    means = means[np.isfinite(means)]
+    constant = float(means.mean()) if "tow_force" in why and len(means) else None
+    value = value_of(e, c, found, tow[1] if tow else [], constant)
+    name = f"steady.{k + 1}"
+    parts = parts_of(e, c.finished, value["n"], windy(case_of(e, {"id": name})))
+    start = found and found["start_up"]
+    hours = sum(f["hours"] for f in tow[1]) if tow else 0.0
+    return {
+        "id": name, "label": c.label, "values": c.values, "fields": len(c.finished), "hours": hours, "value": value,
+        "gap_s": found and found["gap_s"], "time_scale_s": found and found["time_scale_s"],
+        "mean": {"id": f"{name}.mean", "n": float(means.mean()) if len(means) else np.nan,
+                 "interval_95": stat_mean.t_interval(means)},
+        "parts": [{"id": f"{name}.{part}", "part": part, "n": n, "share": n / value["n"] if value["n"] else np.nan}
+                  for part, n in parts.items()],
+        "start_up": start and start["largest"], "doubts": sorted({d for m in c.finished for d in e.doubts(m)})}
+
+
+def with_speed(row, e, c):
+    """The same with its speed and concentration, from a member."""
+    for m in c.members:
+        if e.status[m] == FINISHED and e.folder(m).is_dir():
+            with Run(e.folder(m)) as run:
+                return row | {"speed_m_s": run.value("tow.speed"), "concentration": float(run.number("concentration"))}
+    return row | {"speed_m_s": c.values.get("tow.speed", np.nan),
+                  "concentration": c.values.get("ice.concentration", np.nan)}
+
+
+def conditions(e, **more):
+    """Rows of the steady tows of an ensemble."""
+    o = options(**more)
+    return [with_speed(condition(e, c, k, o), e, c) for k, c in enumerate(e.conditions())]
+
+
+def hardest(rows, speed=None):
+    """The row with the largest value, of the speed that is asked for where there is one; None without a value."""
+    some = [r for r in rows if np.isfinite(r["value"]["n"])
+            and (speed is None or not np.isfinite(r["speed_m_s"]) or math.isclose(r["speed_m_s"], speed, rel_tol=1e-6))]
+    return max(some, key=lambda r: r["value"]["n"], default=None)
+
+
+def case_of(e, row):
+    """{key: text} of a condition's case, as the program reads it; {} where no member of it has left a folder."""
+    for m in e.conditions()[int(row["id"].partition(".")[2]) - 1].members:
+        if e.status[m] == FINISHED and e.folder(m).is_dir():
+            with Run(e.folder(m)) as run:
+                return run.case
+    return {}
+
+
+def tow_of(e, row, line, vessel):
+    """The steady tow of a row as load_cases takes it; None where no member of it has left a folder, or where it has no
+    ice resistance."""
+    c = e.conditions()[int(row["id"].partition(".")[2]) - 1]
+    part = {p["part"]: p["n"] for p in row["parts"]}
+    for m in c.finished:
+        if not e.folder(m).is_dir():
+            continue
+        with Run(e.folder(m)) as run:
+            direction = run.value("tow.direction", 0.0)
+            vertices = run.bodies[run.towed].vertices
+            x, y = vertices.T
+            value = row["value"]
+            return load_cases.Tow(
+                case=run.case, speed=row["speed_m_s"], direction=direction,
+                mass=load_cases.mass_of(run, direction), water=part["water"], wind=part["wind"], ice=part["ice"],
+                value=value["n"], kind=value["kind"], interval=value.get("interval_95"),
+                width=run.number("estimates.width_m"), area=0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)),
+                case_ramp=run.value("tow.ramp", 0.0),
+                case_start=np.nan if row["start_up"] is None else row["start_up"], scale=row["time_scale_s"] or
+                stat_loads.TIME_SCALE / e.scaling(m), slower=e.scaling(m), distance=run.value("run.duration")
+                * row["speed_m_s"], line=line, vessel_mass=vessel.mass)
+    return None
+
+
+# ---- what follows
+
+
+def steady_case(row):
+    value = row["value"]
+    return load_cases.row("steady", value["n"], value["kind"], "ensemble", runs=row["fields"], of=row["id"],
+                          interval_95=value.get("interval_95"), reason=value.get("reason"))
+
+
+def speeds(rows, v, efficiency):
+    """What the hardest ice of each speed needs, against what the vessel has."""
+    out = []
+    for speed in sorted({r["speed_m_s"] for r in rows if np.isfinite(r["speed_m_s"])}):
+        r = hardest(rows, speed)
+        if r is None:
+            continue
+        has = gear.pull_at(v, speed, efficiency)
+        value = r["value"]
+        out.append({"id": f"speed.{len(out) + 1}", "of": r["id"], "speed_m_s": speed, "needs_n": value["n"],
+                    "kind": value["kind"], "interval_95": value.get("interval_95"), "has_n": has,
+                    "feasible": gear.verdict(value["n"], value.get("interval_95"), has)})
+    return out
+
+
+def feasible(some, asked, v, efficiency, t):
+    """Can the vessel do it at the speed that is asked, and up to which?"""
+    here = next((s for s in some if math.isclose(s["speed_m_s"], asked, rel_tol=1e-6)), None)
+    out = {"id": "feasible", "speed_m_s": asked, "verdict": here["feasible"] if here else "not_asked",
+           "not_above_m_s": None, "by": None, "reason": None}
+    if not np.isfinite(v.pull):
+        return out | {"verdict": "not_asked", "reason": "no_vessel"}
+    if len(some) > 1:
+        limit = gear.limit_speed([s["speed_m_s"] for s in some], [s["needs_n"] for s in some],
+                                 [s["has_n"] for s in some])
+        if limit is not None:
+            return out | {"not_above_m_s": limit, "by": "speeds"}
+    if not some or some[0]["has_n"] < some[0]["needs_n"]:
+        return out | {"reason": "no_speed_is_feasible"}
+    last = some[-1]
+    limit = gear.limit_by_drag(v, efficiency, last["speed_m_s"], last["needs_n"],
+                               (t.water + t.wind) * (last["speed_m_s"] / t.speed) ** 2) if t else None
+    return out | {"not_above_m_s": limit, "by": limit and "drag_alone"}
+
+
+def sentence(a):
+    """What the answer says, a code with values and the rows that they are from."""
+    out, d, v, line = [], a["design"], a["vessel"], a["line"]
+    if d is None:
+        return [{"code": "no_value", "values": {}, "rows": []}]
+    rows = {row["id"]: row for row in a["load_cases"] + a["conditions"]}
+    case = rows[d["row"]]
+    out.append({"code": {"at_least": "needs_at_least", "largest_of_n": "needs_largest"}.get(d["kind"], "needs"),
+                "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
+                "rows": ["design", d["row"]]})
+    steady = rows[rows["case.steady"]["of"]]
+    if steady["value"]["kind"] == "largest_of_n":
+        out.append({"code": "covers", "values": steady["value"], "rows": [steady["id"]]})
+    if case.get("of"):
+        out.append({"code": "band", "values": a["band"], "rows": ["band"] + [r["id"] for r in a["assumed"]]})
+    out.append({"code": "vessel", "values": {k: v[k] for k in ("needed_bollard_pull_n", "speed_m_s", "efficiency",
+                                                               "given_n")}, "rows": ["vessel"]})
+    out.append({"code": "line", "values": line, "rows": ["line", line["row"]]})
+    if a["feasible"]["verdict"] != "not_asked":
+        out.append({"code": "feasible", "values": a["feasible"], "rows": ["feasible"] + [s["id"] for s in a["speeds"]]})
+    out += [{"code": "beside", "values": {"n": c["n"], "case": c["id"]} | c["values"], "rows": [c["id"]]}
+            for c in a["load_cases"] if not c["in_design"] and np.isfinite(c["n"])]
+    if a["ramp"]:
+        keys = "s", "n", "by", "verified", "case_s", "case_n"
+        out.append({"code": "start", "values": {k: a["ramp"][k] for k in keys}, "rows": ["ramp", "case.start"]})
+    return out
+
+
+def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
+    """The whole answer. asked: what the call asked for; rows: conditions(); cases: load cases without the steady one;
+    t: the load_cases.Tow of the hardest condition, None without a value."""
+    worst = hardest(rows, asked["speed_m_s"])
+    cases = ([steady_case(worst)] if worst else []) + cases
+    some = [c for c in cases if c["in_design"] and np.isfinite(c["n"])]
+    top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
+    hold = max(some, key=lambda c: c["n"], default=None)
+    design = top and {"id": "design", "row": top["id"], **{k: top[k] for k in ("n", "kind", "interval_95", "reason")},
+                      "value": worst["value"] if top["id"] == "case.steady" else None}
+    found = [r for r in ranges if r["reason"] is None]
+    band = {"id": "band", "low_n": None, "high_n": None, "combined_95": None, "why_not_combined": "no_range",
+            "without": [r["key"] for r in ranges if r["reason"]]}
+    if t is not None and found:
+        low, high = assumed.band(t.value, found)
+        both, why = assumed.combined(t.value, t.interval, ranges)
+        band |= {"low_n": low, "high_n": high, "combined_95": both, "why_not_combined": why}
+    efficiency, factor = asked["efficiency"], asked["line_factor"]
+    n, interval = (top["n"], top["interval_95"]) if top else (np.nan, None)
+    needed = [gear.needed_pull(v, max(0.0, x), asked["speed_m_s"], efficiency) for x in (n, *(interval or ()))]
+    by_speed = speeds(rows, v, efficiency)
+    pull = gear.pull_at(v, asked["speed_m_s"], efficiency)
+    vessel = {"id": "vessel", "name": v.name or None, "needed_bollard_pull_n": needed[0],
+              "needed_interval_95": needed[1:] or None, "needed_t": needed[0] / gear.TONNE,
+              "speed_m_s": asked["speed_m_s"], "free_speed_m_s": v.free_speed, "free_speed_from": v.free_from,
+              "efficiency": efficiency, "given_n": v.pull, "has_n": pull,
+              "holds": gear.verdict(n, interval, pull), "own_resistance": None, "needed_with_ice_n": None}
+    own = gear.own_resistance(v, case_value(t.case, "ice.thickness", 0.0), worst["concentration"],
+                              asked["speed_m_s"]) if t else None
+    if own:
+        vessel |= {"own_resistance": {"low_n": own[0], "high_n": own[1], "source": own[2]}, "needed_with_ice_n": [
+            gear.needed_pull(v, n, asked["speed_m_s"], efficiency, x) for x in own[:2]]}
+    l, load = asked["line_found"], hold["n"] if hold else np.nan
+    line = {"id": "line", "name": l.name or None, "row": hold and hold["id"], "design_tension_n": load,
+            "factor": factor, "needed_breaking_load_n": load * (factor or 1.0), "given_n": l.breaking,
+            "utilisation": load * (factor or 1.0) / l.breaking,
+            "holds": gear.verdict(load * (factor or 1.0), None, l.breaking)}
+    out = {"format": FORMAT, "asked": {k: x for k, x in asked.items() if k != "line_found"}, "plan": plan,
+           "conditions": rows, "load_cases": cases, "ramp": ramp, "design": design, "assumed": ranges, "band": band,
+           "vessel": vessel, "line": line, "speeds": by_speed,
+           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t), "cost": cost, **more}
+    return out | {"sentence": sentence(out)}

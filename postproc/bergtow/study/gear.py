@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""Vessel and line of a tow: what a client names, what the tow force asks for, and up to which speed the vessel holds
+it.
+
+A vessel is a class of the library (bergtow/towing) or a bollard pull, "110 t" or "1.1 MN"; a line is one of the library
+or a breaking load. What neither the call nor the case says is assumed, and named so: the free-running speed. The
+efficiency of the vessel and the safety factor of the line are the user's: no clause of a standard could be read, so
+none is applied unless it is given.
+"""
+import ctypes
+import math
+import re
+from dataclasses import dataclass
+
+from bergtow import _library, towing
+from bergtow.errors import USAGE, BergtowError
+from bergtow.result.run import case_value
+
+import numpy as np
+
+FREE_SPEED = 14 * 1852 / 3600   # m/s, assumed where neither the vessel nor the case says it, as in cases/fullscale
+TONNE = 1000 * towing.vessel.STANDARD_GRAVITY  # N, tonne-force
+
+
+@dataclass(frozen=True)
+class Vessel:
+    name: str
+    pull: float          #: N, bollard pull; NaN where no vessel is named
+    free_speed: float    #: m/s
+    free_from: str       #: "library", "case" or "assumed"
+    beam: float          #: m, NaN where it is not known
+    mass: float          #: kg
+
+
+@dataclass(frozen=True)
+class Line:
+    name: str
+    breaking: float      #: N, NaN where it is not known
+    stiffness: float     #: EA, N
+    length: float        #: m
+
+
+def force(text, option):
+    """N of "110 t" (tonnes-force), "1.1 MN"; None where the text is no number with such a unit. Errors: BergtowError
+    where it is none above zero."""
+    tonnes = re.fullmatch(r"\s*([\d.]+)\s*(?:t|tf|tonnes?)\s*", text)
+    value = ctypes.c_double()
+    try:
+        if tonnes:
+            value.value = TONNE * float(tonnes[1])
+        else:
+            _library.library().bt_number_read(text.encode(), b"N", ctypes.byref(value))
+    except (BergtowError, ValueError):
+        return None
+    if not (math.isfinite(value.value) and value.value > 0):
+        raise BergtowError(f"{option} {text}: is not above zero; give it as \"110 t\" or \"1.1 MN\"", USAGE)
+    return value.value
+
+
+def vessel(text, case, library=None):
+    """The vessel of the call (text or None), or that of the case. Errors: BergtowError."""
+    own = {k: case_value(case, f"tow.vessel.{k}", 0.0) for k in ("bollard_pull", "free_speed", "mass")}
+    thrust = case.get("tow.mode") == "thrust"
+    free, free_from = (own["free_speed"], "case") if thrust and own["free_speed"] > 0 else (FREE_SPEED, "assumed")
+    mass = own["mass"] if thrust and own["mass"] > 0 else np.nan
+    if text is None:
+        pull = own["bollard_pull"] if thrust else np.nan
+        return Vessel("case" if thrust else "", pull, free, free_from, np.nan, mass)
+    pull = force(text, "--vessel")
+    if pull is not None:
+        return Vessel(text, pull, free, free_from, np.nan, mass)
+    found = towing.find_vessel(text, library)
+    known = np.isfinite(found.free_speed)
+    return Vessel(found.name, found.bollard_pull, found.free_speed if known else free,
+                  "library" if known else free_from, found.beam, found.mass if np.isfinite(found.mass) else mass)
+
+
+def line(text, case, library=None, own_length=None):
+    """The line of the call (text or None), or that of the case; own_length, m, in place of the case's. Errors:
+    BergtowError."""
+    there = case.get("tow.mode") in ("line", "thrust")
+    number = lambda key: case_value(case, key, np.nan) if there else np.nan
+    length, stiffness = own_length or number("tow.line_length"), number("tow.line_stiffness")
+    if text is None:
+        load = number("tow.line.breaking_load")
+        return Line("case" if there else "", load if load > 0 else np.nan, stiffness, length)
+    load = force(text, "--line")
+    if load is not None:
+        return Line(text, load, stiffness, length)
+    found = towing.find_line(text, library)
+    return Line(found.name, found.breaking, found.stiffness, length)
+
+
+def needed_pull(v, load, speed, efficiency, own=0.0):
+    """Bollard pull, N, for a tow force at a speed; inf from the free-running speed on. What is not finite stays."""
+    if not np.isfinite(load):
+        return load
+    return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
+
+
+def pull_at(v, speed, efficiency, own=0.0):
+    """What the vessel pulls with at a speed, N; NaN without a vessel."""
+    left = efficiency * v.pull * towing.pull_share(speed, v.free_speed) - own
+    return left if not left < 0 else 0.0
+
+
+def verdict(load, interval, has):
+    """Does a pull hold a load? "yes", "no", "open" where it lies within the interval, "not_asked" without a vessel. A
+    load without an interval counts as it is; an end that is None or infinite is no bound."""
+    if not np.isfinite([load, has]).all():
+        return "not_asked" if not np.isfinite(has) else "open"
+    low, high = interval or (load, load)
+    high = np.inf if high is None or np.isnan(high) else high
+    low = load if low is None or np.isnan(low) else low
+    return "yes" if high <= has else "no" if low > has else "open"
+
+
+def own_resistance(v, thickness, concentration, speed):
+    """(low, high, source) of what the ice takes of the vessel itself, N, an order of magnitude; None without a beam."""
+    if not (np.isfinite(v.beam) and thickness > 0):
+        return None
+    found = towing.ice_resistance(v.beam, thickness, concentration, speed)
+    return found.low, found.high, found.source
+
+
+def limit_speed(speeds, needs, has):
+    """m/s at which the need first exceeds what the vessel has, linear between speeds; None where it never does, or does
+    from the first on."""
+    gap = np.asarray(has) - np.asarray(needs)
+    if gap[0] < 0:
+        return None
+    for k in range(1, len(gap)):
+        if gap[k] < 0:
+            return float(speeds[k - 1] + (speeds[k] - speeds[k - 1]) * gap[k - 1] / (gap[k - 1] - gap[k]))
+    return None
+
+
+def limit_by_drag(v, efficiency, speed, load, drag):
+    """The same of a single speed: the drag goes with the square of the speed, all else of the load is held as it is,
+    which is assumed. None where the vessel cannot hold the load at that speed, or holds it at any."""
+    def gap(u):
+        return pull_at(v, u, efficiency) - (load + drag * ((u / speed) ** 2 - 1))
+    if not np.isfinite(v.pull) or gap(speed) < 0:
+        return None
+    low, high = speed, v.free_speed
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if gap(middle) >= 0 else (low, middle)
+    return low

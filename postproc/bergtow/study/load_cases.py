@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: MIT
+"""The load cases of a tow beside the steady one: start, course change, stop, loss of thrust, a line that parts, head
+current and wind. Each is a row with its load, by short runs of its own or by a closed form; the row says which.
+
+With M the mass of the body with that of the water that it carries, V the speed, D the drag of water and wind at V, R
+the mean ice resistance, F the design value of the steady tow, k = EA/L of the line:
+
+    start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
+                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that
+                     ramp, and with shorter ones as long as these hold, show what the ice makes of it
+    course change    along the course as in runs through a bend of radius r, across it M V^2/r: the root of the squares
+    stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
+    loss of thrust   the body goes on by  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if ice and water
+                     alone stop it; where the line is taken up again at a relative speed of V, which bounds it, the load
+                     is towing.snap_load
+    a line parts     of a bridle of two like branches, the pull held: the other one is loaded from F/2, and swings, as
+                     nothing damps it, to 3/2 F. A single line: the tow is lost, and the body goes on as above
+    head sea         paired runs with current and wind against the tow: as stats/assumed takes a value that changes
+
+Angle and radius of the bend are assumed unless the call gives them, and so are current and wind. These decide the load
+- a head current of half the speed doubles the drag - so where they are assumed the row stands beside the design value,
+and is not in it.
+"""
+import math
+from dataclasses import dataclass
+
+from bergtow import towing
+from bergtow.result.run import Run, case_value, within
+from bergtow.stats import load as stat_load
+from bergtow.stats import loads as stat_loads
+from bergtow.study import assumed
+from bergtow.study.runs import SPENT
+from bergtow.table import quantity
+
+import numpy as np
+
+SHORTER = 0.6            # of a ramp that holds: the next that is tried
+LONGER = 1.5             # of one that does not
+RAMPS = 3                # that are tried, at most
+HEAD_CURRENT, HEAD_WIND = 0.25, 15.0  # m/s at full scale, assumed
+SETTLE = 300.0           # s at full scale, before and after a bend
+BEND_WIDTHS = 10.0       # radius of the bend / length of the body, assumed
+PARTED = 1.5             # load of the branch that is left / pull
+NO_WIND = 1e-3           # of the load: air drag below it is that of the body's own way
+
+
+@dataclass
+class Tow:
+    """The steady tow that the load cases are of, in SI units."""
+
+    case: dict             #: {key: text}, as the program reads it
+    speed: float
+    direction: float       #: rad
+    mass: float            #: with the water carried along
+    water: float           #: drag
+    wind: float
+    ice: float             #: mean resistance
+    value: float           #: F; all forces in N
+    kind: str              #: of F, as in the answer
+    interval: tuple | None
+    width: float           #: across the flow, m
+    area: float            #: of the waterline, m2
+    case_ramp: float       #: s, of the case as it is
+    case_start: float      #: largest mean over `scale` before the window with it; NaN where it is not known
+    scale: float           #: s, over which loads are averaged
+    slower: float          #: time at full scale / time of the case
+    distance: float        #: of the tow, m
+    line: object           #: gear.Line
+    vessel_mass: float     #: kg, NaN where it is not known
+
+    @property
+    def mean(self):
+        return self.water + self.wind + self.ice
+
+    @property
+    def spring(self):
+        """EA/L, N/m; NaN without a line that is known."""
+        return self.line.stiffness / self.line.length if self.line.length > 0 else np.nan
+
+
+@dataclass
+class Runs:
+    """The runs of load cases and ranges: study/runs.py, with a count, and without an end where one fails."""
+
+    runs: object
+    fields: range           #: of paired runs, whose interval is that of these fields
+    few: range              #: of those of which the largest value is taken
+    left_out: bool = False  #: none is to be made
+    count: int = 0
+    spent: bool = False
+
+    def make(self, name, sets, fields=None):
+        """None where they are there, or the code of why they are not: "budget", "run_failed"."""
+        if self.left_out or self.spent:
+            return "left_out" if self.left_out else "budget"
+        why = self.runs.make(name, fields or self.fields, sets)
+        if SPENT in why:
+            self.spent = True
+            return "budget"
+        if any(why):
+            return "run_failed"
+        self.count += len(why)
+        return None
+
+    def measured(self, name, measure, fields=None):
+        """[measure(run)] of the fields."""
+        out = []
+        for i in fields or self.fields:
+            with Run(self.runs.path(name, i)) as run:
+                out.append(measure(run))
+        return out
+
+
+def mean_parts(run):
+    """Mean ice resistance and water speed in the window of a run, its drag of the water and its whole drag."""
+    water = run.number("estimates.open_water_drag.force_n")
+    return {"ice": float(run.number("mean_ice_resistance_n")), "water": water,
+            "drag": run.number("mean_drag_force_n")}
+
+
+def largest_mean(run, scale, start, end):
+    """Largest mean over `scale` of the tow force between two times, N; NaN where there is none."""
+    some, time = stat_loads.of_run(run)
+    x = next((x for load, x in some if load.name == "tow_force"), None)
+    if x is None:
+        return np.nan
+    there = within(time, start, end)
+    dt = float(np.median(np.diff(time)))
+    n = max(1, int(round(scale / dt)))
+    return float(stat_load.moving_mean(x[there], n).max()) if np.sum(there) >= n else np.nan
+
+
+def mass_of(run, direction):
+    """Mass of the body with the water that it carries, kg: its inertia over its acceleration along the tow; NaN where
+    it is never accelerated."""
+    v = np.cos(direction) * run["body_vx"] + np.sin(direction) * run["body_vy"]
+    a, f = np.diff(v) / np.diff(run["time"]), run["inertia_force"][1:]
+    some = np.isfinite(a) & np.isfinite(f) & (np.abs(a) > 0.05 * np.nanmax(np.abs(a), initial=0.0))
+    return float(np.sum(f[some] * a[some]) / np.sum(a[some] ** 2)) if some.any() else np.nan
+
+
+def row(name, n, kind, by, acts_on="tow", **more):
+    return {"id": f"case.{name}", "n": n, "kind": kind, "by": by, "acts_on": acts_on, "in_design": True,
+            "interval_95": None, "runs": 0, "set": {}, "formula": None, "values": {}, "reason": None} | more
+
+
+def none(name, reason, **more):
+    """A row without a load."""
+    return row(name, np.nan, "none", more.pop("by", "runs"), reason=reason, **more)
+
+
+# ---- closed forms
+
+
+def start_ramp(t):
+    """Seconds of the ramp that asks for no more than the steady tow does; inf where its value is not above the mean."""
+    above = t.value - t.mean
+    by_inertia = t.mass * t.speed / above if above > 0 else np.inf
+    if np.isfinite(t.spring):
+        return max(by_inertia, towing.ramp_for(t.value, t.speed, t.spring, t.mass, resistance=t.mean))
+    return by_inertia
+
+
+def taut_stop(t):
+    return t.mass * t.speed / t.mean
+
+
+def coasting(t):
+    """(m, s) that the body goes on for without thrust; (nan, nan) where no ice stops it."""
+    drag, ice = t.water + t.wind, t.ice
+    if not (drag > 0 and ice > 0):
+        return np.nan, np.nan
+    return (t.mass * t.speed ** 2 / (2 * drag) * math.log1p(drag / ice),
+            t.mass * t.speed / math.sqrt(drag * ice) * math.atan(math.sqrt(drag / ice)))
+
+
+def stop(t):
+    return row("stop", t.mean, "closed_form", "closed_form", formula="taut_stop",
+               values={"slack_below_s": taut_stop(t), "mass_kg": t.mass, "mean_n": t.mean})
+
+
+def loss_of_thrust(t):
+    distance, time = coasting(t)
+    values = {"coasts_m": distance, "coasts_s": time, "line_m": t.line.length}
+    if not np.isfinite(t.spring):
+        return none("loss_of_thrust", "line_not_known", by="closed_form", acts_on="line", formula="coasting",
+                    values=values)
+    heavy = towing.effective_mass(t.mass, t.vessel_mass if np.isfinite(t.vessel_mass) else np.inf)
+    snap = towing.snap_load(t.speed, t.spring, heavy, static=t.mean)
+    return row("loss_of_thrust", snap, "bound", "closed_form", "line", formula="snap_load",
+               values=values | {"relative_speed_m_s": t.speed, "stiffness_n_m": t.spring, "effective_mass_kg": heavy})
+
+
+def line_parted(t):
+    if t.case.get("tow.line.branches") == "2" and t.case.get("tow.mode") in ("line", "thrust"):
+        return row("line_parted", PARTED * t.value, "closed_form", "closed_form", "line", formula="one_of_two_branches",
+                   values={"pull_n": t.value, "factor": PARTED})
+    distance, time = coasting(t)
+    return none("line_parted", "single_line_tow_is_lost", by="closed_form", acts_on="line", formula="coasting",
+                values={"coasts_m": distance, "coasts_s": time})
+
+
+# ---- runs
+
+
+def start(t, runs, say):
+    """(row, ramp): the shortest ramp tried whose start takes no more than the steady tow."""
+    first = start_ramp(t)
+    own = {"case_s": t.case_ramp, "case_n": t.case_start}
+    ramp = {"id": "ramp", "s": first, "n": t.value, "limit_n": t.value, "by": "closed_form", "closed_form_s": first,
+            "verified": False, **own}
+    def closed(reason):
+        return row("start", t.value if np.isfinite(first) else np.nan,
+                   "closed_form" if np.isfinite(first) else "none", "closed_form", formula="start_ramp", reason=reason,
+                   values=own | {"ramp_s": first, "mass_kg": t.mass}), ramp
+    if not np.isfinite(first):
+        return closed("value_not_above_mean")
+    if t.case.get("tow.programme", "none") != "none":
+        return closed("case_has_programme")
+    seconds, held, tried, reason = first, None, [], None
+    for _ in range(RAMPS):
+        seconds = math.ceil(seconds / t.scale) * t.scale
+        if t.speed * seconds / 2 > t.distance:
+            reason = reason or "domain_too_short"
+            break
+        name = f"start-{seconds:.6g}s"
+        sets = {"tow.ramp": f"{seconds:.9g} s", "run.duration": f"{seconds + 4 * t.scale:.9g} s",
+                "output.window_start": f"{seconds:.9g} s"}
+        reason = runs.make(name, sets, runs.few)
+        if reason:
+            break
+        n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale), runs.few))
+        tried.append({"ramp_s": seconds, "n": n})
+        say(f"a start with a ramp of {seconds / 60:.3g} min takes {quantity(n, 'N')}")
+        if n <= t.value:
+            held = tried[-1] | {"set": sets}
+            seconds *= SHORTER
+        elif held:
+            break
+        else:
+            seconds *= LONGER
+    if held is None:
+        found, ramp = closed(reason or "no_ramp_held")
+        if tried:
+            best = min(tried, key=lambda x: x["n"])
+            found |= {"n": best["n"], "kind": "largest_of_n", "by": "runs", "runs": len(tried) * len(runs.few)}
+            ramp |= {"s": best["ramp_s"], "n": best["n"], "by": "runs"}
+        return found | {"values": found["values"] | {"tried": tried}}, ramp
+    ramp |= {"s": held["ramp_s"], "n": held["n"], "by": "runs", "verified": True}
+    return row("start", held["n"], "largest_of_n", "runs", runs=len(tried) * len(runs.few), set=held["set"],
+               values=own | {"n_tows": len(runs.few), "ramp_s": held["ramp_s"], "closed_form_s": first,
+                             "mass_kg": t.mass, "tried": tried}), ramp
+
+
+def course_change(t, runs, degrees, radius):
+    """Through a bend."""
+    if t.case.get("tow.waypoints", "none") != "none" or t.case.get("tow.programme", "none") != "none":
+        return none("course_change", "case_has_path")
+    if t.case.get("tow.mode") != "speed":
+        return none("course_change", "needs_mode_speed")
+    r = radius or BEND_WIDTHS * t.width
+    angle, settle = math.radians(degrees), SETTLE / t.slower
+    x, y = (float(t.case[f"body.{k}"].split()[0]) for k in "xy")
+    first = t.speed * (t.case_ramp / 2 + settle) + r * math.tan(angle / 2)
+    last = t.speed * settle + r * math.tan(angle / 2)
+    d = [np.array([math.cos(t.direction + a), math.sin(t.direction + a)]) for a in (0.0, angle)]
+    corner = np.array([x, y]) + first * d[0]
+    end = corner + last * d[1]
+    way = first + last - 2 * r * math.tan(angle / 2) + r * angle
+    if way > t.distance:
+        return none("course_change", "domain_too_short", values={"way_m": way, "radius_m": r, "angle_deg": degrees})
+    duration = t.case_ramp / 2 + way / t.speed
+    sets = {"tow.waypoints": f"[[{corner[0]:.9g}, {corner[1]:.9g}], [{end[0]:.9g}, {end[1]:.9g}]]",
+            "tow.turn_radius": f"{r:.9g} m", "run.duration": f"{duration:.9g} s",
+            "output.window_start": f"{t.case_ramp + settle / 2:.9g} s"}
+    values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius), "across_n": t.mass * t.speed ** 2 / r}
+    if reason := runs.make("course-change", sets, runs.few):
+        return none("course_change", reason, set=sets, values=values)
+    begin = t.case_ramp + settle
+    along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2),
+                              runs.few))
+    return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.few),
+               set=sets, formula="hypot", values=values | {"along_n": along})
+
+
+def with_steady(t, n, ends, r):
+    """The interval of a changed load with that of the steady tow in it, whose sides change by R'/R: the root of the
+    squares of either; None where one of the two is not known."""
+    if not np.isfinite(ends).all() or t.interval is None or np.isnan(t.interval).any():
+        return None
+    return tuple(n + sign * math.hypot(end - n, r * (own - t.value))
+                 for sign, end, own in zip((-1, 1), ends, t.interval))
+
+
+def changed(t, base, other):
+    """(load, (low, high) of the paired fields, parts) of the steady tow in another run: F' = W' + w R'/R. base, other:
+    mean_parts of the fields."""
+    r, ends = assumed.ratio([b["ice"] for b in base], [o["ice"] for o in other])
+    fixed, rest = np.mean([o["drag"] for o in other]), t.value - t.water - t.wind
+    return fixed + rest * r, tuple(fixed + rest * x for x in ends), {"ice_ratio": r, "drag_n": fixed, "rest_n": rest}
+
+
+def head_sea(t, runs, current=None, wind=None):
+    """Current and wind against the tow, m/s, on the fields of the base. Where both are None they are assumed, at model
+    scale by Froude's law."""
+    given = current is not None or wind is not None
+    current, wind = (x if x is not None else 0.0 if given else y / t.slower
+                     for x, y in ((current, HEAD_CURRENT), (wind, HEAD_WIND)))
+    if any(t.case.get(key, "none") != "none" for key in ("water.current_table", "air.wind_table")):
+        return none("head_sea", "environment_from_table")
+    d = np.array([math.cos(t.direction), math.sin(t.direction)])
+    own = {key: float(t.case.get(key, "0").split()[0]) for key in ("water.current_x", "water.current_y", "air.wind_x",
+                                                                   "air.wind_y")}
+    sets = {f"water.current_{k}": f"{own[f'water.current_{k}'] - current * d[i]:.9g} m/s" for i, k in enumerate("xy")}
+    sets |= {f"air.wind_{k}": f"{own[f'air.wind_{k}'] - wind * d[i]:.9g} m/s" for i, k in enumerate("xy")}
+    values = {"current_m_s": current, "wind_m_s": wind, "given": given}
+    if reason := runs.make("base", {}) or runs.make("head-sea", sets):
+        return none("head_sea", reason, set=sets, values=values)
+    base, other = (runs.measured(name, mean_parts) for name in ("base", "head-sea"))
+    if not np.isfinite([x for some in (base, other) for part in some for x in part.values()]).all():
+        return none("head_sea", "no_window", set=sets, values=values)
+    n, ends, parts = changed(t, base, other)
+    largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
+    return row("head_sea", n, "changed", "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
+               interval_95=with_steady(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
+
+
+# ---- ranges
+
+
+def effect(t, r, runs):
+    """The row of one range. A drag coefficient by its closed form, all else by paired runs."""
+    key, at = r.key, t.case.get(r.key, "")
+    out = {"id": f"range.{key}", "key": key, "at": at, "low": r.low, "high": r.high, "source": r.source,
+           "distribution": r.distribution or None, "n_low": None, "n_high": None, "n_low_95": None, "n_high_95": None,
+           "n_per_tenth": None, "fields": 0, "runs": 0, "reason": None}
+    part = assumed.ANALYTIC.get(key)
+    if part:
+        form = form_drag(t) if part == "water" else t.wind
+        return out | {"by": "analytic", "n_per_tenth": assumed.TENTH * form,
+                      "n_low": form * (float(r.low) / float(at) - 1), "n_high": form * (float(r.high) / float(at) - 1)}
+    reason = runs.make("base", {})
+    for end in ("low", "high"):
+        name = f"{key}-{end}"
+        reason = reason or runs.make(name, {key: getattr(r, end)})
+        if reason:
+            return out | {"by": "runs", "reason": reason}
+        base, other = (runs.measured(n, mean_parts) for n in ("base", name))
+        n, ends, _ = changed(t, base, other)
+        out |= {f"n_{end}": n - t.value, f"n_{end}_95": tuple(e - t.value for e in ends) if np.isfinite(ends).all()
+                else None}
+    low, high, here = in_one_unit(r.low, r.high, at)
+    slope = (out["n_high"] - out["n_low"]) / (high - low) if high != low else np.nan
+    return out | {"by": "runs", "fields": len(runs.fields), "runs": 2 * len(runs.fields),
+                  "n_per_tenth": assumed.TENTH * here * slope}
+
+
+def in_one_unit(*texts):
+    """Numbers of texts with the same unit, as "5 m" or "0.3"; NaN of all where their units differ."""
+    parts = [str(text).split(None, 1) for text in texts]
+    try:
+        return [float(p[0]) for p in parts] if len({tuple(p[1:]) for p in parts}) == 1 else [np.nan] * len(parts)
+    except (ValueError, IndexError):
+        return [np.nan] * len(parts)
+
+
+def form_drag(t):
+    """The part of the water's drag that its form coefficient makes, N: the rest is friction under the body."""
+    form = 0.5 * float(t.case["body.drag.water_form"]) * case_value(t.case, "body.draft") * t.width
+    return t.water * form / (form + float(t.case["body.drag.water_skin"]) * t.area)

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: MIT
+"""The answer of `bergtow design` in words: the sentence, and its tables. answer: that of study/answer.py, as it comes
+back from answer.json, where what is not finite is None."""
+import math
+
+from bergtow.table import designed, number, short, table
+
+KNOT = 1852 / 3600
+TONNE = 9806.65
+HEADINGS = {"load_cases": "Load cases", "parts": "What the tow force is made of", "assumed": "What is assumed",
+            "speeds": "Speeds", "plan": "What it took"}
+CASES = {"case.steady": "steady tow", "case.start": "start", "case.course_change": "course change",
+         "case.stop": "stop", "case.loss_of_thrust": "loss of thrust", "case.line_parted": "a line parts",
+         "case.head_sea": "head current and wind"}
+PARTS = {"ice": "ice", "water": "water drag", "wind": "wind", "coriolis": "Coriolis", "slope": "slope of the sea",
+         "inertia": "inertia", "fluctuation": "above the mean"}
+KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at_least": "at least",
+         "closed_form": "closed form", "bound": "upper bound", "changed": "changed from the steady tow",
+         "constant": "does not vary", "none": "–"}
+#: what stands for the code of a reason
+REASONS = {
+    "no_tail": "too few peaks for a tail", "no_window": "no window that is long enough", "no_member": "no run",
+    "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
+    "budget": "the budget was spent", "run_failed": "the run failed", "domain_too_short": "the domain is too short",
+    "case_has_path": "the case has a path of its own: it is in the steady tow",
+    "case_has_programme": "the case has a programme of its own", "needs_mode_speed": "for tow.mode: speed alone",
+    "environment_from_table": "the case has current or wind from a table",
+    "line_not_known": "stiffness and length of the line are not known", "single_line_tow_is_lost": "the tow is lost",
+    "value_not_above_mean": "the value is not above the mean", "no_ramp_held": "no ramp that was tried holds",
+    "left_out": "left out"
+}
+#: why there is no single figure for fields and ranges together
+NOT_COMBINED = {"range_without_distribution": "some ranges have no distribution",
+                "range_without_effect": "the effect of some ranges is not known",
+                "no_interval_of_fields": "the value has no interval", "no_range": "no range was looked at"}
+
+
+def known(x):
+    return x is not None and math.isfinite(x)
+
+
+def kn(n):
+    """N as kN, to three digits, without unit."""
+    return number(n / 1e3) if known(n) else "–"
+
+
+def force(n):
+    """A load that is designed for."""
+    return f"{number(designed(n) / 1e3)} kN" if known(n) else "no value"
+
+
+def ends(interval, to="to"):
+    """"620 to 700"; "" without an interval."""
+    if interval is None or interval[0] is None:
+        return ""
+    return f"{kn(interval[0])} {to} {kn(interval[1]) if interval[1] is not None else 'no bound'}"
+
+
+def speed(v):
+    return f"{short(v / KNOT)} kn"
+
+
+def minutes(s):
+    return f"{short(s / 60, 2)} min"
+
+
+def percent(x):
+    return f"{100 * x:.0f} %"
+
+
+# ---- the sentence
+
+
+def _over(a):
+    scale = next((c["time_scale_s"] for c in a["conditions"] if known(c["time_scale_s"])), a["asked"]["time_scale_s"])
+    return f"as a mean over {short(scale, 2)} s"
+
+
+def _in_case(v):
+    return "" if v["case"] == "case.steady" else f" in the load case \"{CASES[v['case']]}\""
+
+
+def _needs(v, a):
+    interval = f" ({ends(v['interval_95'])}, 95 % of the fields)" if ends(v["interval_95"]) else ""
+    return f"The tow needs {force(v['n'])}{interval} {_over(a)}{_in_case(v)}"
+
+
+def _largest(v, a):
+    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v)}"
+
+
+def _covers(v, a):
+    return (f"There are too few peaks for a tail: the largest of {v['n_tows']} steady tows of "
+            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence "
+            f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
+            f"{short(a['asked']['tow_hours'], 2)} h bears more")
+
+
+def _at_least(v, a):
+    return f"The tow needs at least {force(v['n'])} {_over(a)}{_in_case(v)}, since {REASONS[v['reason']]}"
+
+
+def _band(v, a):
+    if v["low_n"] is None:
+        return "What is assumed was not looked at"
+    out = f"Over the ranges of what is assumed the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
+    drag = next((r for r in a["assumed"] if r["key"] == "body.drag.water_form" and known(r["n_per_tenth"])), None)
+    if drag:
+        out += f"; a tenth of the water's drag coefficient is {kn(drag['n_per_tenth'])} kN"
+    if v["combined_95"]:
+        out += f"; fields and ranges together: {ends(v['combined_95'])} kN (95 %)"
+    return out
+
+
+def _vessel(v, a):
+    eta = f" at an efficiency of {short(v['efficiency'])}" if v["efficiency"] != 1 else ""
+    if not known(v["needed_bollard_pull_n"]):
+        return "No bollard pull can be named"
+    return (f"It takes a vessel of at least {math.ceil(v['needed_bollard_pull_n'] / TONNE)} t bollard pull{eta} at "
+            f"{speed(v['speed_m_s'])}")
+
+
+def _line(v, a):
+    factor = f" with the safety factor {short(v['factor'])}" if v["factor"] else " before any safety factor"
+    out = f"a line of at least {force(v['needed_breaking_load_n'])} breaking load{factor}"
+    if v["row"] and v["row"] != a["design"]["row"]:
+        out += f", by the load case \"{CASES[v['row']]}\""
+    if known(v["utilisation"]):
+        out += f"; the line named is used to {percent(v['utilisation'])}"
+    return out
+
+
+def _feasible(v, a):
+    words = {"yes": "feasible", "no": "not feasible", "open": "not decided by the interval"}[v["verdict"]]
+    out = f"With the vessel named the tow is {words} at {speed(v['speed_m_s'])}"
+    if known(v["not_above_m_s"]):
+        by = ", by the drag alone, with the load of the ice held (assumed)" if v["by"] == "drag_alone" else ""
+        out += f", and not above {speed(v['not_above_m_s'])}{by}"
+    return out
+
+
+def _start(v, a):
+    if not known(v["s"]):
+        return "No ramp makes the start harmless: the value is not above the mean"
+    out = f"It sets off within {force(v['n'])} with a ramp of {minutes(v['s'])}"
+    out += {"runs": "" if v["verified"] else ", the least of those tried",
+            "closed_form": ", by the closed form: no run has confirmed it"}[v["by"]]
+    if known(v["case_n"]) and known(a["design"]["n"]) and v["case_n"] > a["design"]["n"]:
+        out += f"; the ramp of the case, {minutes(v['case_s'])}, takes {force(v['case_n'])}"
+    return out
+
+
+def _beside(v, a):
+    return (f"Against a current of {short(v['current_m_s'])} m/s and a wind of {short(v['wind_m_s'])} m/s, which are "
+            f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
+
+
+WORDS = {"beside": _beside, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+         "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
+         "start": _start,
+         "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
+
+
+def sentence(answer, traced=False):
+    """The answer in one paragraph; traced: each part with the rows that its numbers are from."""
+    out = []
+    for part in answer["sentence"]:
+        text = WORDS[part["code"]](part["values"], answer)
+        if part["code"] == "line":  # goes on where the vessel stops
+            out[-1] = f"{out[-1][:-1]} and {text}."
+        else:
+            out.append(f"{text}.")
+        if traced and part["rows"]:
+            out[-1] = f"{out[-1][:-1]} [{', '.join(part['rows'])}]."
+    return " ".join(out)
+
+
+# ---- tables
+
+
+def _behind(row):
+    """What stands behind a load case."""
+    v, said = row["values"], []
+    def add(key, words):
+        if known(v.get(key)):
+            said.append(words.format(v[key], short(v[key]), minutes(v[key])))
+    add("ramp_s", "ramp {2}")
+    add("slack_below_s", "line slack if stopped in less than {2}")
+    add("coasts_m", "goes on for {1} m")
+    add("coasts_s", "{2}")
+    add("relative_speed_m_s", "taken up at {1} m/s")
+    add("angle_deg", "{1} deg")
+    add("radius_m", "radius {1} m")
+    add("current_m_s", "current {1} m/s")
+    add("wind_m_s", "wind {1} m/s")
+    add("factor", "{1} times the pull")
+    if row["reason"]:
+        said.append(REASONS.get(row["reason"], row["reason"]))
+    return ", ".join(said) or "–"
+
+
+def load_cases(a, markdown):
+    top = (a["design"] or {}).get("row")
+    rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
+             ends(c["interval_95"]) or "–", KINDS[c["kind"]],
+             {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
+              "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
+    return table(["load case", "kN", "95 % of the fields", "kind", "by", "with"], rows, markdown) + \
+        ("\n\n* design value" if top else "") + \
+        ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "")
+
+
+def parts(a, markdown):
+    rows = []
+    for c in a["conditions"]:
+        value = c["value"]["n"]
+        rows += [[c["label"] if k == 0 else "", PARTS[p["part"]], kn(p["n"]),
+                  percent(p["share"]) if known(p["share"]) else "–"]
+                 for k, p in enumerate(x for x in c["parts"] if known(x["n"]) and value and abs(x["n"]) >= 0.0005
+                                       * abs(value))]
+        rows.append(["", KINDS[c["value"]["kind"]], kn(value), "100 %" if known(value) else "–"])
+    return table(["condition", "part", "kN", "share"], rows, markdown)
+
+
+def assumed(a, markdown):
+    rows = [[r["key"], f"{r['at']} ({r['low']} to {r['high']})", kn(r["n_low"]), kn(r["n_high"]),
+             kn(r["n_per_tenth"]), "closed form" if r["by"] == "analytic" else f"{r['fields']} common fields",
+             r["distribution"] or REASONS.get(r["reason"], "none stated"), r["source"]] for r in a["assumed"]]
+    note = NOT_COMBINED.get(a["band"]["why_not_combined"])
+    head = ["assumed", "value (range)", "low end kN", "high end kN", "a tenth kN", "by", "distribution", "source"]
+    return table(head, rows, markdown) + (f"\n\nNo single figure for fields and ranges: {note}." if note else "")
+
+
+def speeds(a, markdown):
+    rows = [[speed(s["speed_m_s"]), kn(s["needs_n"]), ends(s["interval_95"]) or "–", kn(s["has_n"]),
+             s["feasible"].replace("_", " ")] for s in a["speeds"]]
+    return table(["speed", "needs kN", "95 % of the fields", "vessel kN", "feasible"], rows, markdown)
+
+
+def plan(p):
+    """Before the first run: what a value takes, and what the budget gives."""
+    each = f"{p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min"
+    fields = each if p["window_hours"] > 0 else "a window"
+    gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
+             "nothing": "not one"}[p["gives"]]
+    return (f"A design value takes some {short(p['needs_hours'], 2)} h of tow in windows: {fields}, some "
+            f"{short(p['needs_min'], 2)} min here. The budget reaches for {p['budget_fields']} fields, {gives}. "
+            "(Estimates: the program's own of its speed, and of how soon the ice in contact is other ice.)")
+
+
+def took(a, markdown):
+    c = a["cost"]
+    rows = [["wall time", f"{short(c['wall_s'] / 60, 2)} min"], ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
+            ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
+    return table(["what", "took"], rows, markdown)
+
+
+def text(answer, markdown=False):
+    """The sentence and all tables."""
+    out = [sentence(answer, traced=markdown)]
+    for name, make in (("load_cases", load_cases), ("parts", parts), ("assumed", assumed), ("speeds", speeds),
+                       ("plan", took)):
+        if name == "plan" or answer[{"parts": "conditions"}.get(name, name)]:
+            out.append(f"{'## ' if markdown else ''}{HEADINGS[name]}\n\n{make(answer, markdown)}")
+    return "\n\n".join(out)
+
+
+def remarks(answer):
+    """What speaks against the numbers, in words."""
+    out = [f"{CASES[c['id']]}: {REASONS.get(c['reason'], c['reason'])}" for c in answer["load_cases"]
+           if c["kind"] == "none"]
+    v = answer["vessel"]
+    if v["free_speed_from"] == "assumed":
+        out.append(f"the free-running speed of the vessel is assumed, {speed(v['free_speed_m_s'])}")
+    if answer["line"]["factor"] is None:
+        out.append("the line has no safety factor: name one with --line-factor")
+    return out + [w["text"] for w in answer.get("warnings", []) if w.get("text")]

@@ -1,0 +1,384 @@
+# SPDX-License-Identifier: MIT
+"""The answer of `bergtow design`: coverage of its intervals, closed forms of its load cases, ranges, remedies, and one
+call on a small case."""
+import json
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy
+
+import made_up_ensemble as made_up
+from harness import BERGTOW, ROOT, TOW, call, changed, write_case
+from harness import run as simulated
+
+import bergtow
+from bergtow import cli
+from bergtow.reporting import design
+from bergtow.reporting import ensemble as report_ensemble
+from bergtow.result.members import Members
+from bergtow.result.run import Run
+from bergtow.stats import extreme, largest
+from bergtow.stats import load as stat_load
+from bergtow.stats import mean as stat_mean
+from bergtow.study import answer, assumed, gear, load_cases
+from bergtow.text import answer as words
+
+
+# ---- coverage
+
+def test_the_largest_of_n_covers_whatever_the_distribution():
+    """1,000 draws of eight tows: the share of tows below the largest is what it says with 95 % confidence. Red: n + 1
+    in place of n, or the confidence in place of one minus it."""
+    rng = np.random.default_rng(1)
+    for drawn in (rng.gumbel(size=(1000, 8)), rng.pareto(2.0, (1000, 8)), rng.normal(size=(1000, 8))):
+        ranks = np.sort(drawn.ravel())
+        below = np.searchsorted(ranks, drawn.max(axis=1)) / ranks.size
+        assert 0.93 <= np.mean(below >= largest.share_below(8)) <= 0.97
+    found = largest.largest_of([3.0, 9.0, 5.0], [1, 1, 1])
+    assert found["n"] == 9 and found["share_below"] == pytest.approx(0.05 ** (1 / 3)) and found["n_tows"] == 3
+    for share in (0.5, 0.9, 0.95):
+        n = largest.tows_for(share)
+        assert largest.confidence(n, share) >= 0.95 > largest.confidence(n - 1, share)
+        assert largest.tows_for(largest.share_below(n)) == n
+
+
+def known_load(rng, n, shape, rate):
+    """Excesses of n fields of an hour of a load whose tail is known: clusters come like a Poisson process."""
+    return [((1 - rng.uniform(size=k)) ** -shape - 1) / shape for k in rng.poisson(rate, n)]
+
+
+def coverage(draws, shape, n=8, rate=8, hours=468.0):
+    rng, true, held = np.random.default_rng(2), extreme.growth(shape, rate * hours), 0
+    for _ in range(draws):
+        each = known_load(rng, n, shape, rate)
+        fit = extreme.gpd(np.concatenate(each))
+        [(_, (low, high))], _ = extreme.gpd_intervals(each, np.ones(n), 0.0, *fit, [hours])
+        held += low <= true <= high
+    return held / draws
+
+
+@pytest.mark.slow
+def test_intervals_of_return_levels_hold_the_known_one():
+    """1,000 draws of made-up loads with a known level of 468 h, 64 clusters in eight fields."""
+    assert 0.93 <= coverage(1000, -0.1) <= 0.97
+
+
+def test_intervals_of_the_mean_hold_the_known_one():
+    """1,000 draws of eight fields of a skewed load, and of a normal one. Red: the normal quantile in place of t's."""
+    rng = np.random.default_rng(3)
+    for drawn in (rng.normal(size=(8, 1000)), rng.gamma(9.0, size=(8, 1000)) - 9.0):
+        low, high = stat_mean.t_interval(drawn)
+        assert 0.93 <= np.mean((low <= 0) & (high >= 0)) <= 0.97
+
+
+# ---- ranges
+
+def test_the_ratio_of_paired_fields():
+    """Against all resamples of pairs by hand; fields that differ alike leave no interval. Red: unpaired fields."""
+    base = np.array([80.0, 120.0, 100.0, 95.0])
+    r, ends = assumed.ratio(base, 1.3 * base)
+    assert r == pytest.approx(1.3) and ends == pytest.approx((1.3, 1.3))
+    other = 1.3 * base + np.array([2.0, -2.0, 1.0, -1.0])
+    r, (low, high) = assumed.ratio(base, other)
+    half = scipy.stats.t.ppf(0.975, 3) * np.std(other - r * base, ddof=1) / 2 / base.mean()
+    assert (low, high) == pytest.approx((r - half, r + half)) and high - low < 0.2
+    assert np.isnan(assumed.ratio([1.0], [2.0])[1]).all() and assumed.ratio([0.0, 0.0], [1.0, 2.0])[0] == 1
+
+
+def effect(low, high, distribution=None):
+    return {"n_low": low, "n_high": high, "distribution": distribution}
+
+
+def test_band_and_single_figure():
+    """The worst corner takes every sign; one figure only where every range has a distribution, by a Monte Carlo of the
+    same. Red: variances of the ends in place of those of the distributions."""
+    rows = [effect(-30.0, 50.0), effect(20.0, -10.0)]
+    assert assumed.band(100.0, rows) == (60.0, 170.0)
+    assert assumed.band(100.0, [effect(5.0, 9.0)]) == (100.0, 109.0) and assumed.band(7.0, []) == (7.0, 7.0)
+    assert assumed.combined(100.0, (90.0, 110.0), rows) == (None, "range_without_distribution")
+    rows = [effect(-30.0, 50.0, "uniform"), effect(-60.0, 60.0, "normal"), effect(-40.0, 40.0, "triangular")]
+    assert assumed.combined(100.0, None, rows)[1] == "no_interval_of_fields"
+    rng, n = np.random.default_rng(4), 400000
+    drawn = 100 + rng.normal(0, 10 / 1.96, n) + rng.uniform(-30, 50, n) + rng.normal(0, 60 / 1.96, n) + rng.triangular(
+        -40, 0, 40, n)
+    (low, high), why = assumed.combined(100.0, (90.0, 110.0), rows)
+    assert why is None and ((low + high) / 2, (high - low) / 2) == pytest.approx(
+        (drawn.mean(), 1.96 * drawn.std()), rel=0.01)
+
+
+def test_ranges_of_a_study(tmp_path):
+    (tmp_path / "s.yml").write_text("parameters:\n  ice.friction: {from: 0.1, to: 0.4, distribution: uniform}\n")
+    [r] = assumed.read(tmp_path / "s.yml")
+    assert (r.key, r.low, r.high, r.distribution, r.source) == ("ice.friction", "0.1", "0.4", "uniform", "assumed")
+    (tmp_path / "s.yml").write_text("parameters:\n  ice.friction: [0.1, 0.4]\n")
+    with pytest.raises(bergtow.BergtowError, match="ice.friction is no range; write it as {from"):
+        assumed.read(tmp_path / "s.yml")
+    assert [r.key for r in assumed.applies(assumed.RANGES, lambda key, default: default, False)] == [
+        "body.drag.water_form", "ice.friction"]  # no wind, and floes that do not raft
+
+
+# ---- closed forms
+
+def tow(**more):
+    """A berg of 4.65e8 kg at a knot."""
+    line = gear.Line("", np.nan, np.nan, np.nan)
+    return load_cases.Tow(**({
+        "case": {"tow.mode": "speed"}, "speed": 0.5144, "direction": 0.0, "mass": 4.65e8, "water": 5.5e5, "wind": 0.0,
+        "ice": 1e5, "value": 8e5, "kind": "return_level", "interval": (7.5e5, 9e5), "width": 80.0, "area": 5000.0,
+        "case_ramp": 155.0, "case_start": np.nan, "scale": 30.0, "slower": 1.0, "distance": 1800.0, "line": line,
+        "vessel_mass": np.nan} | more))
+
+
+def test_coasting_against_the_equation_of_motion():
+    """M dv/dt = -D (v/V)^2 - R, by SciPy. Red: 2 left out of the distance."""
+    t = tow(wind=2e4)
+    def slow(_, x):
+        return [x[1], -((t.water + t.wind) * (x[1] / t.speed) ** 2 + t.ice) / t.mass]
+    def stopped(_, x):
+        return x[1]
+    stopped.terminal = True
+    found = scipy.integrate.solve_ivp(slow, (0, 1e5), [0.0, t.speed], events=stopped, rtol=1e-10, atol=1e-9)
+    assert load_cases.coasting(t) == pytest.approx((found.y[0, -1], found.t[-1]), rel=1e-6)
+    assert np.isnan(load_cases.coasting(tow(ice=0.0))).all()
+
+
+def test_ramp_and_stop():
+    t = tow()
+    ramp = load_cases.start_ramp(t)
+    assert t.mean + t.mass * t.speed / ramp == pytest.approx(t.value)
+    assert t.mass * t.speed / load_cases.taut_stop(t) == pytest.approx(t.mean)  # the deceleration that leaves no pull
+    assert load_cases.start_ramp(tow(value=6e5)) == np.inf
+    line = gear.Line("", 4e6, 2.6e8, 600.0)
+    assert load_cases.start_ramp(tow(line=line)) > ramp  # the line swings
+
+
+def test_a_line_that_parts_and_one_that_snaps():
+    """Of two springs of which one parts, by the energy of the swing."""
+    two = tow(case={"tow.mode": "line", "tow.line.branches": "2"}, line=gear.Line("", 4e6, 2.6e8, 600.0))
+    pull, k = two.value, 1.0
+    before = pull / (2 * k)
+    stretch = scipy.optimize.brentq(lambda x: k * (x * x - before * before) / 2 - pull * (x - before), 1.2 * pull / k,
+                                    3 * pull / k)
+    assert load_cases.line_parted(two)["n"] == pytest.approx(k * stretch)
+    one = load_cases.line_parted(tow())
+    assert one["kind"] == "none" and one["reason"] == "single_line_tow_is_lost" and one["values"]["coasts_m"] > 100
+    snap = load_cases.loss_of_thrust(two)
+    assert snap["n"] > two.speed * math.sqrt(2.6e8 / 600 * 4.65e8) and snap["acts_on"] == "line"
+    assert load_cases.loss_of_thrust(tow())["reason"] == "line_not_known"
+
+
+def test_the_speed_up_to_which_a_vessel_holds():
+    """Red: the drag at the speed taken with the first power."""
+    v = gear.Vessel("", 1.2e6, 7.2, "assumed", np.nan, np.nan)
+    limit = gear.limit_by_drag(v, 0.9, 0.5, 8e5, 5e5)
+    assert gear.pull_at(v, limit, 0.9) == pytest.approx(8e5 + 5e5 * ((limit / 0.5) ** 2 - 1), rel=1e-9)
+    assert gear.limit_by_drag(v, 0.9, 0.5, 2e6, 5e5) is None
+    assert gear.limit_speed([1, 2, 3], [5, 9, 20], [10, 10, 10]) == pytest.approx(2 + 1 / 11)
+    assert gear.limit_speed([1, 2], [5, 9], [10, 10]) is None
+    assert gear.needed_pull(v, 9e5, 0.5, 0.9) * 0.9 * (1 - (0.5 / 7.2) ** 2) == pytest.approx(9e5)
+    assert np.isnan(gear.pull_at(gear.vessel(None, {}), 0.5, 1.0)) and gear.pull_at(v, 9.0, 1.0) == 0  # none is named
+    assert gear.verdict(5, (4, 6), 7) == "yes" and gear.verdict(5, (4, 8), 7) == "open"
+    assert gear.verdict(9, (8, 10), 7) == "no" and gear.verdict(5, None, np.nan) == "not_asked"
+    assert gear.verdict(5, (4, None), 7) == gear.verdict(5, (4, np.inf), 7) == "open"  # no bound above
+
+
+@pytest.mark.parametrize("text, newtons", [("110 t", 110 * 9806.65), ("1.1 MN", 1.1e6), ("900 kN", 9e5), ("tug", None)])
+def test_forces_of_options(text, newtons):
+    assert gear.force(text, "--vessel") == newtons
+
+
+def test_the_drag_of_another_coefficient_is_that_of_the_program(tmp_path):
+    """Open water on the real binary with 0.85 and 1.25. Red: the friction under the body counted as form drag."""
+    case = changed(TOW, ice__concentration=0.0, run__duration=6, output__window_start=3)
+    drag = {}
+    for c in (0.85, 1.25):
+        (tmp_path / str(c)).mkdir()
+        made = simulated(tmp_path / str(c), changed(case, body__drag__water_form=c, body__drag__water_skin=0.05))
+        with Run(made.dir) as run:
+            drag[c] = run.number("mean_drag_force_n")
+            if c == 0.85:
+                x, y = run.bodies[run.towed].vertices.T
+                t = tow(case=run.case, water=run.number("estimates.open_water_drag.force_n"), width=run.number(
+                    "estimates.width_m"), area=0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    row = load_cases.effect(t, assumed.Range("body.drag.water_form", "0.25", "1.25", ""), None)
+    assert row["n_high"] == pytest.approx(drag[1.25] - drag[0.85], rel=1e-6)
+    assert row["n_per_tenth"] == pytest.approx(row["n_high"] / 4 * 0.85, rel=1e-6)  # 0.4 of the coefficient
+
+
+# ---- the answer
+
+def ensemble(tmp_path, value=lambda rng: 60 + 10 * rng.gumbel(size=600), n=4):
+    rng = np.random.default_rng(5)
+    made_up.write(tmp_path / "all", [made_up.member(value(rng), {}, 0) for _ in range(n)])
+    return Members(tmp_path / "all")
+
+
+def test_remedies_name_options_that_exist():
+    """Whatever the commands' own texts name is an option of the command that they name, or of design."""
+    folder = ROOT / "postproc/bergtow"
+    choices = cli.tree("design")._subparsers._group_actions[0].choices
+    own = set(re.findall(r"--[a-z][a-z-]+", choices["design"].format_help() + call("ensemble", "--help").stdout))
+    for file in ("reporting/design.py", "study/answer.py", "study/gear.py", "study/load_cases.py", "text/answer.py"):
+        text = (folder / file).read_text()
+        for found in set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)):
+            assert found in own or f'"{found}"' in text, (file, found)  # in quotes: a word of a call, or of an option
+    few = [{"time": np.arange(9.0), "peak": np.arange(9.0), "start": 0.0, "hours": 0.1, "scale": 1.0, "dt": 1.0}]
+    found = stat_load.extremes(few, 5.0, [1.0], 1)
+    said = " ".join(x["refused"] for x in found.values())
+    assert "refused" in found["over_threshold"] and "--" not in said  # a signal has no option that would help
+
+
+@pytest.mark.parametrize("budget", [3.0, 14.0, 0.4])
+def test_a_remedy_does_not_repeat_what_was_given(budget, tmp_path, monkeypatch, capsys):
+    """The budget that it names is larger than that which was given. Red: the old words, "raise --budget"."""
+    (tmp_path / "out").mkdir()
+    made_up.write(tmp_path / "out", [made_up.member(np.ones(3), {}, 0)] * 1)
+    for name, value in (("seconds_a_field", 900.0), ("seconds_of_the_longest", 0.0), ("widths", {}),
+                        ("fields_settled", 1)):
+        monkeypatch.setattr(design, name, lambda *a, value=value: value)
+    path = write_case(tmp_path, TOW)
+    a = cli.arguments("design", path, "-o", tmp_path / "out", "--budget", str(budget), "--no-replay")
+    a.concentrations, a.by_speed = [], {}
+    work = SimpleNamespace(ensemble=lambda study: True, jobs=1, end=design.time.monotonic() + 60 * budget)
+    design.run_case(work, a, {name: {} for name in design.SECTIONS})
+    said = capsys.readouterr().err
+    assert float(re.search(r"--budget (\d+)", said)[1]) > budget and "run.duration" not in said
+
+
+CASE = changed(TOW, run={"dt": 0.2, "duration": 40}, output__window_start=10, domain__length=14, domain__width=7,
+               ice__concentration=0.3, ice__size=0.9, estimate__length_scale=400)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("answer")
+    write_case(folder, CASE)
+    patch = pytest.MonkeyPatch()
+    patch.setenv("BERGTOW", str(BERGTOW))
+    patch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
+    found = bergtow.design(folder / "case.yml", folder / "out", fields=3, vessel="0.001 t", line="150 N", line_factor=2,
+                           line_length=3, no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s",
+                           bend_radius=1, head_wind=1)
+    patch.undo()
+    return found
+
+
+def test_every_number_of_the_sentence_has_its_row(made):
+    ids = {row["id"] for name in ("conditions", "load_cases", "assumed", "speeds") for row in made[name]}
+    ids |= {made[name]["id"] for name in ("design", "ramp", "band", "vessel", "line", "feasible")}
+    ids |= {part["id"] for row in made["conditions"] for part in row["parts"]}
+    used = [row for part in made["sentence"] for row in part["rows"]]
+    assert used and set(used) <= ids
+    said = words.sentence(made, traced=True)
+    assert set(re.findall(r"\[(.*?)\]", said)) and all(part["code"] in words.WORDS for part in made["sentence"])
+    rows = {row["id"]: row for row in made["load_cases"]}
+    assert made["design"]["n"] == rows[made["design"]["row"]]["n"]
+    assert f"{words.number(words.designed(made['design']['n']) / 1e3)} kN" in said
+
+
+def test_the_design_value_is_the_largest_load_case(made):
+    cases = made["load_cases"]
+    assert [c["id"] for c in cases] == ["case.steady", "case.start", "case.head_sea", "case.course_change", "case.stop",
+                                        "case.loss_of_thrust", "case.line_parted"]
+    assert made["design"]["n"] == max(c["n"] for c in cases if c["acts_on"] == "tow" and c["n"] is not None)
+    assert next(c for c in cases if c["id"] == "case.head_sea")["in_design"]  # given; assumed ones are not
+    t = tow(case={"water.current_table": "x"})
+    assert load_cases.head_sea(t, None)["reason"] == "environment_from_table"
+    assert all(c["n"] is not None or c["reason"] for c in cases)
+    assert made["line"]["utilisation"] == pytest.approx(2 * made["line"]["design_tension_n"] / 150)
+
+
+def test_the_parts_make_up_the_value(made):
+    """Ice, water and the rest are the mean tow force; what is above it makes up the value."""
+    assert len(made["conditions"]) == 2
+    for row in made["conditions"]:
+        part = {p["part"]: p["n"] for p in row["parts"]}
+        assert sum(part.values()) == pytest.approx(row["value"]["n"])
+        assert sum(part.values()) - part["fluctuation"] == pytest.approx(row["mean"]["n"], rel=1e-6)
+        assert part["water"] > 0 and part["wind"] == 0
+
+
+def test_ranges_and_head_sea_are_of_the_same_fields(made):
+    first = made["assumed"][0]
+    assert first["key"] == "body.drag.water_form" and first["by"] == "analytic"
+    low, high = made["band"]["low_n"], made["band"]["high_n"]
+    steady = made["load_cases"][0]["n"]
+    assert low <= steady + first["n_low"] < steady < steady + first["n_high"] <= high
+    assert made["band"]["why_not_combined"] == "range_without_distribution"
+    assert [r["key"] for r in made["assumed"]] == ["body.drag.water_form", "ice.friction"]
+    assert [r["fields"] for r in made["assumed"]] == [0, 4]
+    head = next(c for c in made["load_cases"] if c["id"] == "case.head_sea")
+    assert head["n"] > steady and head["values"]["wind_m_s"] == 1 and head["values"]["current_m_s"] == 0
+
+
+def test_values_that_are_assumed_stay_beside_the_design_value(made):
+    """Without --head-current and --head-wind the same row is not in the design value. Red: it decides the vessel."""
+    a = json.loads(json.dumps(made))
+    row = next(c for c in a["load_cases"] if c["id"] == "case.head_sea")
+    row["in_design"] = False
+    assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
+
+
+def test_speeds_of_one_call(made):
+    """A tow at another speed goes as far; the vessel of the call holds none of them."""
+    slow, fast = made["speeds"]
+    assert (slow["speed_m_s"], fast["speed_m_s"]) == (0.13, 0.2) and fast["needs_n"] > slow["needs_n"]
+    assert {s["feasible"] for s in made["speeds"]} == {"no"} and made["feasible"]["verdict"] == "no"
+    assert made["feasible"]["reason"] == "no_speed_is_feasible"
+
+
+def test_the_fall_back_is_named(made):
+    value = made["conditions"][0]["value"]
+    assert value["kind"] in ("largest_of_n", "return_level")
+    if value["kind"] == "largest_of_n":
+        assert value["n_tows"] == 3 and value["share_below"] == pytest.approx(0.05 ** (1 / 3))
+        said = [part for part in made["sentence"] if part["code"] == "covers"]
+        assert len(said) == 1 and said[0]["rows"] == ["steady.1"] and "37 % of such tows" in words.sentence(made)
+
+
+def test_a_load_without_a_bound_is_at_least(tmp_path):
+    """Where the line parted the largest stands as a lower bound, with the reason."""
+    rng = np.random.default_rng(6)
+    made_up.write(tmp_path / "all", [made_up.member(60 + rng.normal(size=600), {}, 0) for _ in range(3)])
+    e = Members(tmp_path / "all")
+    [c] = e.conditions()
+    found = {"design": {"refused": "x"}, "largest": 70.0}
+    assert answer.value_of(e, c, None, [], None)["reason"] == "no_window"
+    e._events[1].append({"time_s": 100.0, "kind": "line_broken", "subject": 1, "value": 1.0})
+    value = answer.value_of(e, c, found, [], None)
+    assert (value["kind"], value["reason"], value["n"]) == ("at_least", "line_parted", 70.0)
+
+
+def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    path = write_case(tmp_path, CASE)
+    p = answer.plan(BERGTOW, path, [], 1, 2, 0.001, 40)
+    gap = max((2 + 0.9) / 0.13, 30 / 20)
+    assert p["needs_hours"] == pytest.approx(20 * 4 * gap / 3600) and p["window_hours"] == pytest.approx(30 / 3600)
+    assert p["needs_fields"] == math.ceil(3600 * p["needs_hours"] / 30)
+    assert answer.plan(BERGTOW, path, [], 1, 2, np.inf, 9)["budget_fields"] == 9
+    assert json.dumps(p) and "A design value takes some" in words.plan(p)
+
+
+@pytest.mark.slow
+def test_intervals_from_eight_fields_hold_the_mean_of_two_hundred(tmp_path):
+    """200 fields of a cheap case stand for the truth; eight of them are drawn 500 times. The interval of their mean
+    holds that of all, and the largest of the eight is above the share of tows that it claims."""
+    write_case(tmp_path, changed(TOW, run={"dt": 0.2, "duration": 20}, domain={"length": 12, "width": 7},
+                                 ice__concentration=0.5, output__window_start=6))
+    (tmp_path / "study.yml").write_text("base: case.yml\nrepeats: 200\nseed: 7\n")
+    made = call("ensemble", tmp_path / "study.yml", "-o", tmp_path / "all", "--threads", 1, "--jobs", 2, "--quiet",
+                timeout=1200)
+    assert made.returncode == 0, made.stderr
+    e, rng = Members(tmp_path / "all"), np.random.default_rng(8)
+    means = e.summary["mean_tow_force_n"]
+    assert len(means) == 200 and np.isfinite(means).all()
+    drawn = np.array([rng.choice(200, 8, replace=False) for _ in range(500)]).T
+    low, high = stat_mean.t_interval(means[drawn])
+    assert 0.90 <= np.mean((low <= means.mean()) & (means.mean() <= high)) <= 0.98
+    peak = e.summary["peak_tow_force_n"]
+    below = np.searchsorted(np.sort(peak), peak[drawn].max(axis=0), side="right") / 200
+    assert 0.90 <= np.mean(below >= largest.share_below(8)) <= 0.98
