@@ -37,7 +37,7 @@ def templates():
 
 def script():
     """The replay's script, as one function."""
-    parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "replay_controls.js")]
+    parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "raster.js", "replay_controls.js")]
     return "(() => {\n" + "\n".join(parts) + "})();\n"
 
 
