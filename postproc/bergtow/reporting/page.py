@@ -10,7 +10,7 @@ import hashlib
 from datetime import datetime, timezone
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import arguments, progress, writing
 from bergtow.errors import USAGE, BergtowError, RunError
 from bergtow.plot import vector
 from bergtow.reporting import pdf
@@ -135,9 +135,12 @@ def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True,
     """The report of a folder in one or more files. given: {name: text or None} of the title block; also: folders of
     analyses; size: MB of the replay's data. Errors: RunError."""
     given = dict.fromkeys(TITLE_BLOCK) | (given or {})
-    for path, text in pages(folder, paths, given, also, size, compressed).items():
+    with progress.doing(f"report of {folder.name or folder}"):
+        made = pages(folder, paths, given, also, size, compressed)
+    for path, text in made.items():
         if path.suffix.lower() == ".pdf":
-            pdf.write(text, path, force)
+            with progress.doing(path.name):
+                pdf.write(text, path, force)
         else:
             writing.write_text(text, path, force)
         print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+from bergtow import progress
 from bergtow.errors import RunError
 from bergtow.plot import style, vector
 from bergtow.plot import field as plot_field
@@ -77,11 +78,12 @@ def picture(name, title, draw):
     """A figure as {"kind", "name", "title", "svg"}; {"kind", "name", "title", "why"} where there is nothing to draw;
     None where it says so itself."""
     out = {"kind": "figure", "name": name, "title": title}
-    try:
-        figure = draw()
-    except RunError as error:
-        return out | {"why": f"{error.reason}; {error.remedy}"}
-    return out | {"svg": vector.of_figure(figure, name, title)} if figure else None
+    with progress.doing(f"picture: {title}"):
+        try:
+            figure = draw()
+        except RunError as error:
+            return out | {"why": f"{error.reason}; {error.remedy}"}
+        return out | {"svg": vector.of_figure(figure, name, title)} if figure else None
 
 
 def pictures(run):
@@ -336,7 +338,8 @@ def breakable(text):
 def context(run, limit=LIMIT, compress=True, given=None):
     """Everything that page/run.html sets. Errors: RunError."""
     values = [replace(v, value=report_case.short(v.value)) for v in report_case.values(run)]
-    replay = Replay(run, limit, compress) if run.n_frames else None
+    with progress.doing(f"replay of {run.n_frames} frames"):
+        replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
     block = report_case.title_block(run.case, run.attributes, given or {})
     return {

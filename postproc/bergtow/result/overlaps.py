@@ -47,6 +47,7 @@ def intersections(a, a_count, b, b_count):
 
 def areas(a, count):
     """[P] m² of anticlockwise polygons [P, K, 2] of so many corners."""
+    a = a - a[:, :1]  # digits of what lies far out
     corner = np.arange(a.shape[1])
     after = np.where(corner + 1 < count[:, None], corner + 1, 0)
     after = a[np.arange(len(a))[:, None], after]
@@ -111,7 +112,7 @@ def overlaps(outlines):
     size, pairs, found = areas(kept, count), near(middle, reach), []
     for some in np.array_split(pairs, 1 + len(pairs) // BATCH):
         i, j = some.T
-        # about the middle of one: no digits are lost of what lies far out
+        # about the middle of one, for the same reason
         a, b = kept[i] - middle[i, None], kept[j] - middle[i, None]
         meet = ~(_apart(a, b, count[j]) | _apart(b, a, count[i]))
         i, j = i[meet], j[meet]
