@@ -53,10 +53,9 @@ def quoted(text):
     return '"' + "".join(c if c.isalnum() and c.isascii() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 
-def head_of_pages(title, revision):
+def head_of_pages(title, right):
     """The running head and foot of the printed page."""
     left = title if len(title) <= MOST_OF_TITLE else title[:MOST_OF_TITLE - 1].rstrip() + "…"
-    right = f"revision {revision}" if revision not in ("", "–") else ""
     box = 'font: 7.6pt "DejaVu Sans", Verdana, sans-serif; color: #5a6672; vertical-align: bottom; padding-bottom: 4mm;'
     foot = box.replace("bottom; padding-bottom", "top; padding-top")
     return (f"@page {{ @top-left {{ content: {quoted(left)}; width: 75%; text-align: left; {box} }}\n"
@@ -65,11 +64,11 @@ def head_of_pages(title, revision):
             f'@bottom-right {{ content: counter(page) " of " counter(pages); text-align: right; {foot} }} }}\n')
 
 
-def css(title, revision):
+def css(title, marked):
     light, dark = vector.styles()
     return "\n".join([(PAGE / "report.css").read_text(encoding="utf-8"), f":root {{ {light} }}",
                       f"@media (prefers-color-scheme: dark) {{ @media not print {{ :root {{ {dark} }} }} }}",
-                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, revision)])
+                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, marked)])
 
 
 def render(template, context, paper=False):
@@ -80,7 +79,7 @@ def render(template, context, paper=False):
                                                      paper=paper,
                                                      mark=writing.MARK,
                                                      policy=policy(code),
-                                                     css=css(context["title"], context["revision"]),
+                                                     css=css(context["title"], context["marked"]),
                                                      made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
 
 

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 from bergtow import progress
+from bergtow import table as text_table
 from bergtow.errors import RunError
 from bergtow.plot import style, vector
 from bergtow.plot import field as plot_field
@@ -56,17 +57,10 @@ def force(value):
 
 
 def with_interval(mean, low, high):
-    """(mean, 95 % interval) in words, to the two digits that the interval leaves; a dash for what is not known."""
-    if not np.isfinite(mean):
-        return "–", "–"
-    if not np.isfinite(low) or high <= low:
-        return force(mean), "–"
-    half = (high - low) / 2
-    if half < 1e-6 * abs(mean):
-        return force(mean), "no scatter"
-    factor, unit = style.scale([mean], "N")
-    digits = len(style.short(half / factor, 2).partition(".")[2])
-    return f"{mean / factor:.{digits}f} {unit}", f"{low / factor:.{digits}f} to {high / factor:.{digits}f} {unit}"
+    """(mean, 95 % interval) of a force in words, to the digits that the interval leaves."""
+    if np.isfinite([mean, low, high]).all() and 0 <= high - low < 2e-6 * abs(mean):
+        return force(mean), "no scatter" if high > low else "–"
+    return text_table.stated(mean, low, high, "N")
 
 
 def share(value):
@@ -343,7 +337,8 @@ def context(run, limit=LIMIT, compress=True, given=None):
     happened, n_events = events(run)
     block = report_case.title_block(run.case, run.attributes, given or {})
     return {
-        "block": block if any(value != "–" for _, value in block[:4]) else [], "revision": dict(block)["revision"],
+        "block": block if any(value != "–" for _, value in block[:len(report_case.TITLE_BLOCK)]) else [],
+        "marked": report_case.marked(block),
         "title": breakable(run.summary.get("title")
                            or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
         "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,

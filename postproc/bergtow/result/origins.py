@@ -18,7 +18,8 @@ from bergtow.errors import BergtowError
 import numpy as np
 import yaml
 
-TITLE_BLOCK = ("client", "project", "author", "revision")
+TITLE_BLOCK = ("client", "project", "author", "document", "revision", "distribution")
+NAMES = {"document": "document number"}  #: of the title block, where the key is not the name
 
 #: kind: what the label says
 KINDS = {
@@ -211,9 +212,17 @@ def title_block(case, attributes, given):
     """Rows (what, value) of the title block: what is given on the command line, or in the section `report` of a case,
     {key: text}; the date, and the program by its attributes."""
     rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
-    return [(name, scrubbed(" ".join(value.split())) if value not in ("", "none") else "–") for name, value in rows] + [
+    return [(NAMES.get(name, name), scrubbed(" ".join(value.split())) if value not in ("", "none") else "–")
+            for name, value in rows] + [
         ("date", datetime.now(timezone.utc).strftime("%Y-%m-%d")),
         ("program", f"bergtow {attributes.get('version', '')}, revision {attributes.get('revision', 'unknown')}")]
+
+
+def marked(block):
+    """What tells a document from its other issues, for every page: its number and revision, of title_block()."""
+    found = dict(block)
+    number, revision = found[NAMES["document"]], found["revision"]
+    return ", ".join([number] * (number != "–") + [f"revision {revision}"] * (revision != "–"))
 
 
 def scrubbed(text):
