@@ -289,7 +289,7 @@ def test_the_title_block_of_a_study(tmp_path):
 
 # ---- the page
 
-APPENDICES = ["Loads", "Mean ice resistance", "Members", "Replay", "Every key", "Study", "Provenance"]
+APPENDICES = ["Loads", "Mean ice resistance", "Members", "Every key", "Study", "Provenance"]
 HEADINGS = ["Answer", "Limits of operation", "Method", "Model and its limits", "Assumptions", "Convergence",
             "Uncertainty budget", "Independent check", "Validation evidence", "References, symbols and standards",
             *APPENDICES]
@@ -322,7 +322,7 @@ def test_it_holds_every_key_and_labels_what_is_assumed(page, made):
     label = "//section[@id='keys']//tr[th='solver.tolerance']"  # in the appendix, with its label
     assert "assumed" in page.find_element("xpath", label).text
     row = page.find_element("xpath", "//section[@id='assumed']//tr[th='ice.friction']").text
-    assert "0 to 10" in row and "0.3" in row
+    assert "0.3" in row and "given" in row
 
 
 def test_figures_follow_the_dark(page):
@@ -396,7 +396,7 @@ def test_the_ink_on_the_pages(made, tmp_path):
 def test_the_pdf_reads_in_order_and_is_searchable(made):
     text = " ".join("\n".join(pages_of(made / "report.pdf")).split())
     marks = [f" {k + 1} {h} " for k, h in enumerate(HEADINGS[:-len(APPENDICES)])] + [
-        f" Appendix {letter} {h} " for letter, h in zip("ABCDEFG", APPENDICES)]
+        f" Appendix {letter} {h} " for letter, h in zip("ABCDEF", APPENDICES)]
     places = [text.index(mark) for mark in marks]
     assert places == sorted(places) and text.index("Owners & Sons <x>") < places[0]
     raw = re.sub(r"\s+", "", printed("pdftotext", "-raw", made / "report.pdf", "-"))

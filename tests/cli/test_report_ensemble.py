@@ -245,13 +245,12 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
                                           "every value of the range makes it")]
     assert at == sorted(at) and text.index("Assumptions") < at[0]
     assert text.count("<svg") >= 3 and str(tmp_path) not in text and "Not studied" not in text
-    answered = text[:text.index("<h2>Method")]
+    answered = text[:text.index("<h2>Limits of operation")]
     sd = f"{100 * budget['parameters']['sd'] / budget['mean']:.0f} % of the mean"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0",
-                                                      "run.title": ""})
-        assert report_ensemble.ranges({"budget": found["budget"]}) == {
-            "ice.friction": ("uniform from 0 to 1", "a book"), "ice.size": ("above 0", "admitted")}
+    told = {"assumed": [{"key": key, "low": "0.1", "high": "0.5", "source": "a paper"}
+                        for key in ("ice.friction", "body.drag.water_form")]}
+    assert report_ensemble.ranges({"budget": found["budget"]}, told) == {
+        "ice.friction": ("uniform from 0 to 1", "a book"), "body.drag.water_form": ("0.1 to 0.5", "a paper")}
     for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
                   "width", sd):
         assert words in answered, words

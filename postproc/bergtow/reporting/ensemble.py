@@ -368,10 +368,9 @@ def varied(e, runs):
     return [of_all(some) for some in zip(*(values for _, values, *_ in runs))]
 
 
-def ranges(results):
-    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what
-    the program admits."""
-    out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
+def ranges(results, told):
+    """{key: (range, its source)} of what the answer of bergtow design and the uncertainty budget varied."""
+    out = {r["key"]: (f"{r['low']} to {r['high']}", r["source"]) for r in (told or {}).get("assumed", [])}
     for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
     return out
@@ -448,7 +447,7 @@ def context(folder, place=None, given=None, also=()):
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL + NUMERICAL)
                     and any(report_run.applies(v.key, r[2]) for r in runs)],
-        "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
+        "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results), "chapters": parts(found, drawn),
         "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,

@@ -14,6 +14,7 @@ from bergtow.plot import resistance as plot_resistance
 from bergtow.reporting.replay import LIMIT, Replay
 from bergtow.result import origins as report_case
 from bergtow.result.at_least import AtLeast
+from bergtow.result.run import case_value
 
 import numpy as np
 
@@ -304,8 +305,15 @@ def stamp(run):
 
 
 def applies(key, case):
-    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape."""
+    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape, one of
+    walls beside walls, one of crushing where ice is crushed."""
     if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
+        return False
+    edges = {case.get("domain.ends"), case.get("domain.sides")}
+    if key.startswith("domain.wall_") and "wall" not in edges or key == "domain.ahead" and "moving" not in edges:
+        return False
+    if key.startswith("ice.crushing.") and key != "ice.crushing.pressure" and not case_value(
+            case, "ice.crushing.pressure", 0.0) > 0:
         return False
     return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
 

@@ -5,15 +5,10 @@ default.
 What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
 case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
 """
-import json
 import re
 import shlex
-import subprocess
 from dataclasses import dataclass
 from datetime import datetime, timezone
-
-from bergtow._program import program_path
-from bergtow.errors import BergtowError
 
 import numpy as np
 import yaml
@@ -239,26 +234,6 @@ def short(value):
         number = float(found[0])
         return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"
     return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", digits, value)
-
-
-def _range(key):
-    """What the program admits for a key, an entry of --list-keys --json."""
-    if key["type"] == "choice":
-        return ", ".join(key["choices"])
-    if "least" not in key:
-        return ""
-    low, high, unit = key["least"], key["most"], key.get("unit", "").replace("-", "")
-    low = f"above {low:g}" if key.get("above_least") else f"{low:g}"
-    return f"{low} to {'below ' if key.get('below_most') else ''}{high:g} {unit}".strip()
-
-
-def ranges():
-    """{key: range that the program admits}; {} where it cannot be asked."""
-    try:
-        said = subprocess.run([program_path(), "--list-keys", "--json"], capture_output=True, timeout=60, check=True)
-        return {key["name"]: _range(key) for key in json.loads(said.stdout)["keys"]}
-    except (BergtowError, OSError, ValueError, subprocess.SubprocessError):
-        return {}
 
 
 def preface(text):
