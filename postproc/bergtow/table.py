@@ -101,8 +101,9 @@ def bound(value, high):
 
 
 def stated(value, low, high, unit, least=None):
-    """(value, interval) in words with their unit, the ends to what the interval leaves (last_place), "–" for what is not
-    known. A mean has the digits of its interval; a load that is designed for (least: the largest simulated) three."""
+    """(value, interval) in words with their unit, the ends to what the interval leaves (last_place), "–" for what is
+    not known. A mean has the digits of its interval; a load that is designed for (least: the largest simulated)
+    three."""
     if not np.isfinite(value):
         return "–", "–"
     factor, name = scale([value], unit)

@@ -26,7 +26,8 @@ def value(key, text, kind="given", origin=""):
 CONDITIONS = {"conditions": [condition("50 %", value=4e5, interval_95=(3e5, 5e5), largest=3.9e5),
                              condition("70 %", value=7e5, interval_95=(6e5, 9e5), largest=6e5),
                              condition("90 %", largest=2e6)]}
-VALUES = [value("ice.concentration", "varied, 50 to 90 %"), value("air.wind_x", "-10 m/s"), value("air.wind_y", "0 m/s")]
+VALUES = [value("ice.concentration", "varied, 50 to 90 %"), value("air.wind_x", "-10 m/s"),
+          value("air.wind_y", "0 m/s")]
 
 
 def rows(cases, answer=None):

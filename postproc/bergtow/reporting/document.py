@@ -10,21 +10,22 @@ from bergtow.text import loads as loads_text
 
 #: what has been held against observations: case, what was observed, verdict; cases/validation/README.md has it in full
 EVIDENCE = (
-    ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, against what was observed; "
-     "above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
-    ("cover on a barrier", "the form and 1/friction hold; the length scale grows more slowly than the width in channels "
-     "of 5 to 15 floes"),
+    ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, against what was "
+     "observed; above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
+    ("cover on a barrier", "the form and 1/friction hold; the length scale grows more slowly than the width in "
+     "channels of 5 to 15 floes"),
     ("ship model in floes", "none: a prediction"))
 NO_FORCE = ("No measured mean force of a tow with complete conditions is public. No force of this report has been "
             "compared with a measured one; the cases compare where and in which form ice jams with what was reported "
             "of laboratories.")
-SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"), ("d", "draft of the body, m"),
+SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
+           ("d", "draft of the body, m"),
            ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
-STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO 35106, "
-             "not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; that one, "
+STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO "
+             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; that one, "
              "and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
              "chooses standard, factors and weather window.")
 #: keys of what limits an operation, with its name; the first that is known says what was simulated
@@ -77,16 +78,17 @@ def operation(s, cases, values, answer):
         if keys[0] == "ice.concentration" and np.isfinite(pull):
             limit = held(s, pull) or limit
         elif keys[0] == "air.wind_x" and head_sea and head_sea["n"]:
-            limit = (f"at {number(head_sea['values']['wind_m_s'])} m/s with {number(head_sea['values']['current_m_s'])} "
-                     f"m/s of current from ahead the tow needs {quantity(head_sea['n'], 'N')}")
+            air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))
+            limit = (f"at {air} m/s with {water} m/s of current from ahead the tow needs "
+                     f"{quantity(head_sea['n'], 'N')}")
         elif keys[0] == "tow.speed" and answer and (most := (answer.get("feasible") or {}).get("not_above_m_s")):
             limit = f"not above {number(most)} m/s with the vessel named"
         rows.append([name, said, limit])
     rule = ("Nothing is known outside of what was simulated. Where ice is denser, thicker or of larger floes, wind or "
             "current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
     if not np.isfinite(pull):
-        rule += " No vessel is named, so no limit follows from one: its net pull at the speed of the tow has to exceed " \
-            "the load of the condition."
+        rule += " No vessel is named, so no limit follows from one: its net pull at the speed of the tow has to " \
+            "exceed the load of the condition."
     return [lines(rule), table(["limit", "simulated", "what was found"], rows)]
 
 
@@ -105,12 +107,13 @@ def by_hand(run):
     if not np.isfinite([width, speed, draft, form, water]).all():
         return []
     drag = 0.5 * water * form * width * draft * speed ** 2
-    out = [_row("drag of the water", f"½ ρw C W d V² = ½ × {number(water, 4)} kg/m³ × {number(form)} × {number(width)} m "
-                f"× {number(draft)} m × ({number(speed)} m/s)²", drag, run.number("mean_drag_force_n"))]
+    out = [_row("drag of the water", f"½ ρw C W d V² = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
+                f"{number(width)} m × {number(draft)} m × ({number(speed)} m/s)²", drag,
+                run.number("mean_drag_force_n"))]
     if np.isfinite([thick, concentration, ice]).all():
         push = ice * thick * concentration * width * speed ** 2
-        out += [_row("ice brought to the speed of the body", f"ρi h A W V² = {number(ice, 4)} kg/m³ × {number(thick)} m × "
-                     f"{number(concentration)} × {number(width)} m × ({number(speed)} m/s)²", push,
+        out += [_row("ice brought to the speed of the body", f"ρi h A W V² = {number(ice, 4)} kg/m³ × "
+                     f"{number(thick)} m × {number(concentration)} × {number(width)} m × ({number(speed)} m/s)²", push,
                      run.number("mean_ice_resistance_n")),
                 _row("both", "sum", drag + push, run.number("mean_tow_force_n"))]
     return out
@@ -122,8 +125,8 @@ def check(run, estimates):
     if run is None:
         return [lines("No member can be read.")]
     out = [lines("By hand, with the numbers of the first field of the condition that governs. All ice in the way of "
-                 "the body is brought to its speed once: ice that is pushed aside asks for less, ice that hands the push "
-                 "on, rubs or rafts for more.")]
+                 "the body is brought to its speed once: ice that is pushed aside asks for less, ice that hands "
+                 "the push on, rubs or rafts for more.")]
     rows = by_hand(run)
     out += [table(["what", "by hand", "force", "mean of the simulation", "simulated / by hand"], rows)] if rows else \
         [lines("Nothing is towed at a known speed.")]

@@ -13,7 +13,6 @@ from itertools import groupby
 
 from bergtow import table as text_table
 from bergtow.errors import RunError
-from bergtow.plot import style
 from bergtow.plot import design_value as plot_design
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.reporting import document
@@ -121,10 +120,10 @@ def design_row(c):
             str(tow["fields"]), text_table.number(tow["hours"])]
 
 
-def answer(e, s, cases, results):
-    """Blocks of the first chapter: the statement, the table, the figure where there is more than one condition, line and
-    vessel, what it holds for. cases: those of statement.cases(); results: those of other commands, as results_beside()
-    has them."""
+def answer(e, s, cases, results, told=None):
+    """Blocks of the first chapter: the statement, the table, the figure where there is more than one condition, line
+    and vessel, what it holds for. cases: those of statement.cases(); results: those of other commands, as
+    results_beside() has them; told: answer.json of bergtow design, which knows vessel, line and ranges."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
             "largest simulated", "in the start", "fields", "hours"]
@@ -149,7 +148,8 @@ def answer(e, s, cases, results):
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
+             "rows": report_method.beyond(results, e)[1:] if told else
+             report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
     return out + [lines(held)] * bool(held)
 
 
@@ -323,13 +323,13 @@ def results_beside(e, also):
     return out
 
 
-def beside(results):
+def beside(results, told=None):
     """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
     out = []
     for name, (heading, _) in analysis.KINDS.items():
         if name in results:
             out.append(of_part(name, analysis.chapter(name, results[name])))
-        elif name in NOT_STUDIED:
+        elif name in NOT_STUDIED and not (name == "budget" and told and told.get("assumed")):
             out.append((heading, [lines(NOT_STUDIED[name])]))
     return out
 
@@ -369,8 +369,9 @@ def varied(e, runs):
 
 
 def ranges(results, told):
-    """{key: (range, its source)} of what the answer of bergtow design and the uncertainty budget varied."""
-    out = {r["key"]: (f"{r['low']} to {r['high']}", r["source"]) for r in (told or {}).get("assumed", [])}
+    """{key: (range, its source)} of what the uncertainty budget varied, or the answer of bergtow design, whose own
+    table has the sources."""
+    out = {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])}
     for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
     return out
@@ -383,8 +384,8 @@ def of_answer(found):
     from bergtow.text import answer as answer_text
     said = blocks(scrubbed(answer_text.text(found, markdown=True)))
     starts = [k for k, b in enumerate(said) if b["kind"] == "heading"]
-    return answer_text.sentence(found), [(said[a]["text"], said[a + 1:b])
-                                         for a, b in zip(starts, [*starts[1:], len(said)])]
+    parts_of = [(said[a]["text"], said[a + 1:b]) for a, b in zip(starts, [*starts[1:], len(said)])]
+    return answer_text.sentence(found), [part for part in parts_of if part[0] != answer_text.HEADINGS["plan"]]
 
 
 def governs(s):
@@ -438,7 +439,7 @@ def context(folder, place=None, given=None, also=()):
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block,
         "marked": report_case.marked(block),
-        "sentence": scrubbed(sentence), "answer": answer(e, s, cases, results), "tables": tables,
+        "sentence": scrubbed(sentence), "answer": answer(e, s, cases, results, told), "tables": tables,
         "operation": document.operation(s, cases, values, told), "check": checked, "evidence": document.evidence(),
         "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
@@ -448,7 +449,7 @@ def context(folder, place=None, given=None, also=()):
                     and not v.key.startswith(PERSONAL + NUMERICAL)
                     and any(report_run.applies(v.key, r[2]) for r in runs)],
         "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
-        "beside": beside(results), "chapters": parts(found, drawn),
+        "beside": beside(results, told), "chapters": parts(found, drawn),
         "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),

@@ -4,6 +4,7 @@ from what was simulated."""
 import numpy as np
 
 from bergtow.result import compared
+from bergtow.result.origins import short as in_short
 from bergtow.result.origins import source_of_ice
 from bergtow.result.run import case_value
 from bergtow.stats import alike as stat_alike
@@ -166,7 +167,7 @@ def holds(cases):
     said = [f"{label}: {number(v['value'])} m/s" + (
         f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})" if np.isfinite(v["interval_95"]).all()
         else "") for label, v in made]
-    return [row("tow speed asked for", lambda case: case.texts.get("tow.speed", "–")),
+    return [row("tow speed asked for", lambda case: in_short(case.texts.get("tow.speed", "–"))),
             *[("speed made good", "; ".join(said))] * bool(said),
             row("breaking load of the line", _breaking), row("bollard pull of the vessel", _pull)]
 

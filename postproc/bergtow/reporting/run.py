@@ -305,8 +305,8 @@ def stamp(run):
 
 
 def applies(key, case):
-    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape, one of
-    walls beside walls, one of crushing where ice is crushed."""
+    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape,
+    one of walls beside walls, one of crushing where ice is crushed."""
     if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
         return False
     edges = {case.get("domain.ends"), case.get("domain.sides")}

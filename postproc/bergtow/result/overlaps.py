@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Where floes lie over each other: the intersections of convex outlines, for pictures.
 
-Pairs are worked on many at a time, corner by corner: a picture of 37,000 floes has 100,000 pairs of neighbours, of which
-one at a time would take half a minute.
+Pairs are worked on many at a time, corner by corner: a picture of 37,000 floes has 100,000 pairs of neighbours, and one
+at a time they would take half a minute.
 """
 import numpy as np
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The floes of a picture as pixels, by the area of each pixel that a floe covers; follows replay.js within one function.
+// The floes of a picture as pixels, by the area of each pixel that a floe covers; follows replay.js in one function.
 //
 // A canvas draws tens of thousands of outlines in seconds, and a graphics processor is not on every machine. What is
 // asked for here is less than it does: convex or not, an outline is one closed polygon of one colour. Its edges add to
-// `cover` what each takes from the pixels to its right, and sums along the rows are the area covered. `seen` adds up the
-// areas of all floes in a pixel: what goes beyond the whole pixel is floes over each other.
+// `cover` what each takes from the pixels to its right, and sums along the rows are the area covered. `seen` adds up
+// the areas of all floes in a pixel: what goes beyond the whole pixel is floes over each other.
 
 const LEAST_OVER = 12;  // of 255 of a pixel: less is the rounding of two areas, and the slop of the solver
 
@@ -67,9 +67,9 @@ function coverEdges(n, x0, y0, w, h, stride) {
     }
 }
 
-// The polygon of the first n corners of paint.x, paint.y, in [r, g, b] on `ground`, of rgba(). seam: 0 … 1, how much of the pixels
-// at its edge is left to the ground, so that floes that touch are told apart. over: colour of floes over each other, or
-// null.
+// The polygon of the first n corners of paint.x, paint.y, in [r, g, b] on `ground`, of rgba(). seam: 0 … 1, how much of
+// the pixels at its edge is left to the ground, so that floes that touch are told apart. over: colour of floes over
+// each other, or null.
 function fillPolygon(n, colour, ground, seam, over) {
     const {x, y, pixels, seen, image} = paint;
     let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;

@@ -100,7 +100,7 @@ function value(kind, frame, i) {
 
 const image = (d, period) => period > 0 ? d - period * Math.round(d / period) : d;
 
-// Pose [x, y, yaw] of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth; into `out`.
+// Pose [x, y, yaw] of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth; in `out`.
 function floePose(i, p, out = [0, 0, 0]) {
     const k = Math.min(Math.floor(p), T - 1), a = k * N + i, w = p - k;
     const xa = X0 + DX * data.x[a], ya = Y0 + DY * data.y[a];
