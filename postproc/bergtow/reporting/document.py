@@ -25,9 +25,9 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO "
-             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; that one, "
-             "and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
-             "chooses standard, factors and weather window.")
+             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; that "
+             "one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow chooses "
+             "standard, factors and weather window.")
 #: keys of what limits an operation, with its name; the first that is known says what was simulated
 LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
             ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
@@ -54,29 +54,33 @@ def load(c):
 
 
 def pull_of(cases, answer):
-    """Bollard pull that limits are held against, N; NaN where no vessel is named."""
-    given = ((answer or {}).get("vessel") or {}).get("given_n")
-    return float(given) if given else max((case.bollard_pull for _, case in cases), default=np.nan)
+    """(N, what it is) of the pull that limits are held against: the least that the vessel of the answer has at a speed
+    asked for, or the bollard pull of the case, of which less is left at speed; NaN where no vessel is named."""
+    at_speed = [x["has_n"] for x in (answer or {}).get("speeds", []) if x.get("has_n")]
+    if at_speed:
+        return float(min(at_speed)), "what the vessel pulls at the speed asked for"
+    return (max((case.bollard_pull for _, case in cases), default=np.nan),
+            "the bollard pull, of which less is left at speed")
 
 
-def held(s, pull):
-    """In words, which of the conditions a vessel holds by its bollard pull."""
+def held(s, pull, what):
+    """In words, which of the conditions a vessel holds by its pull."""
     some = [(c["label"], load(c)) for c in s["conditions"] if load(c) is not None]
     yes, no = ([name for name, n in some if (n <= pull) == holds] for holds in (True, False))
-    return "; ".join([f"within the pull of {quantity(pull, 'N')}: {loads_text.several(yes)}"] * bool(yes) +
-                     [f"above it: {loads_text.several(no)}"] * bool(no))
+    return "; ".join([f"{where} {quantity(pull, 'N')}, {what}: {loads_text.several(names)}"
+                      for where, names in (("within", yes), ("above", no)) if names])
 
 
 def operation(s, cases, values, answer):
     """Blocks of the limits of operation."""
     text = {v.key: in_short(v.value) for v in values}
-    pull, rows = pull_of(cases, answer), []
+    (pull, what), rows = pull_of(cases, answer), []
     head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
     for name, keys in LIMITING:
         said = " and ".join(text[k] for k in keys if k in text) or "–"
         limit = "not looked for"
         if keys[0] == "ice.concentration" and np.isfinite(pull):
-            limit = held(s, pull) or limit
+            limit = held(s, pull, what) or limit
         elif keys[0] == "air.wind_x" and head_sea and head_sea["n"]:
             air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))
             limit = (f"at {air} m/s with {water} m/s of current from ahead the tow needs "

@@ -444,7 +444,7 @@ def context(folder, place=None, given=None, also=()):
         "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],
-        "method": report_method.method(s, cases), "limits": report_method.limits(cases),
+        "method": report_method.method(s, cases), "limits": report_method.limits(cases, bool(told and told["speeds"])),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL + NUMERICAL)
                     and any(report_run.applies(v.key, r[2]) for r in runs)],

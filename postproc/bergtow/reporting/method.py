@@ -118,9 +118,9 @@ def _vessel(case):
     return "" if np.isfinite(case.bollard_pull) else "No vessel is judged: the case names no bollard pull."
 
 
-def limits(cases):
+def limits(cases, vessel=False):
     """Sentences on what the model leaves out, the gravest first; what is not so of all cases, with its conditions.
-    cases: those of statement.cases()."""
+    cases: those of statement.cases(); vessel: is one judged?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if not cases:
@@ -132,7 +132,7 @@ def limits(cases):
     out += of_each(lambda case: _ice(case, kappa, pressure))
     out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
                "there are no waves.")
-    for say in (_pack, _end, _line, _vessel):
+    for say in (_pack, _end, _line, *[_vessel] * (not vessel)):
         out += of_each(say)
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
