@@ -25,9 +25,9 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO "
-             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; that "
-             "one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow chooses "
-             "standard, factors and weather window.")
+             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
+             "that one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
+             "chooses standard, factors and weather window.")
 #: keys of what limits an operation, with its name; the first that is known says what was simulated
 LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
             ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
