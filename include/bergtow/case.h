@@ -270,7 +270,7 @@ typedef struct bt_case {
         char *source;            ///< where it was published
     } reference;
     struct {
-        char *client, *project, *author, *revision; ///< for the title block of reports
+        char *client, *project, *author, *document, *revision, *distribution; ///< for the title block of reports
     } report;
     /// [k] values of keys that were added to the table (bt_keys_add: of force laws, of contact laws and of sections of
     /// a program), SI, in the order of their addition

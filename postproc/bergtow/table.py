@@ -100,6 +100,24 @@ def bound(value, high):
     return np.inf if np.isfinite([value, high]).all() and value > 0 and high > FAR * value else high
 
 
+def stated(value, low, high, unit, least=None):
+    """(value, interval) in words with their unit, the ends to what the interval leaves (last_place), "–" for what is
+    not known. A mean has the digits of its interval; a load that is designed for (least: the largest simulated)
+    three."""
+    if not np.isfinite(value):
+        return "–", "–"
+    factor, name = scale([value], unit)
+    high = bound(value, high) if least is not None else high
+    place = None if np.isnan([low, high]).any() else last_place(value / factor, low / factor, high / factor)
+    if least is not None:
+        said = quantity(designed(value, least), unit)
+    elif place is None or isinstance(value, AtLeast):
+        said = quantity(value, unit)
+    else:
+        said = f"{to_place(value / factor, place)} {name}"
+    return said, "–" if place is None else f"{' to '.join(to_place(x / factor, place) for x in (low, high))} {name}"
+
+
 def level(value, ends, factor=1.0):
     """A level, to three digits, and its interval, to those that it is worth."""
     low, high = ends[0], bound(value, ends[1])

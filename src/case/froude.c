@@ -30,8 +30,9 @@ static const struct {
 
 // Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well;
 // at a scale of 1 it is that of the twin.
-static const char *const plain_texts[] = {"run.title",     "reference.source", "report.client",
-                                         "report.project", "report.author",    "report.revision"};
+static const char *const plain_texts[] = {"run.title",       "reference.source", "report.client",
+                                         "report.project",  "report.author",    "report.document",
+                                         "report.revision", "report.distribution"};
 
 // L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with
 // other exponents.

@@ -511,7 +511,9 @@ bt_key bt_case_keys[] = {
     TEXT("report.client", report.client, "none", "for whom the report is, for its title block"),
     TEXT("report.project", report.project, "none", "name or number of the project, for the title block"),
     TEXT("report.author", report.author, "none", "who answers for the report, for the title block"),
+    TEXT("report.document", report.document, "none", "number of the document, for the title block and every page"),
     TEXT("report.revision", report.revision, "none", "revision of the report, for the title block and every page"),
+    TEXT("report.distribution", report.distribution, "none", "who gets the report, for the title block"),
 
     EIGHT_SPARE,
     EIGHT_SPARE,

@@ -15,7 +15,8 @@ static const char *const fields[] = {"own", "common", NULL};
 const bt_key bt_study_keys[] = {
     ROW("title", TEXT, "none", "one line for the reports; a member has it with its condition and its field"),
     ROW("report", MAP, "none",
-        "client, project, author and revision for the title block of the report: {client: ..., revision: B}"),
+        "client, project, author, document (its number), revision and distribution for the title block of the "
+        "report: {client: ..., revision: B}"),
     ROW("base", TEXT, NULL, "the case that is varied; relative to the folder of the study file"),
     ROW("set", MAP, "none", "keys of the case that are replaced in every member: {run.duration: 600 s}"),
     ROW("parameters", MAP, "none",

@@ -141,7 +141,7 @@ def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
     (1051e3, 1050.5e3, 9000e3, ("1050 kN", "1050 to 9000 kN"))
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
-    assert report_ensemble.worth(value, low, high) == words
+    assert text_table.stated(value, low, high, "N", -np.inf) == words
 
 
 @pytest.mark.parametrize("value, largest, words", [
@@ -153,7 +153,7 @@ def test_a_value_is_not_rounded_below_the_largest_simulated(value, largest, word
     there, and the table of the terminal."""
     d = {"value": value, "interval_95": (0.9 * value, 3 * value), "largest": largest, "beyond_data": False,
          "start_up": None}
-    assert report_ensemble.worth(value, *d["interval_95"], largest)[0] == words
+    assert text_table.stated(value, *d["interval_95"], "N", largest)[0] == words
     said = report_ensemble.governing({"conditions": [{"label": "c", "design": {"tow": d}}]})
     newtons = float(words.split()[0]) * {"kN": 1e3, "MN": 1e6}[words.split()[1]]
     assert f"c, {words} ({text_table.number(newtons / 9806.65)} tonne-force)" in said
@@ -289,8 +289,10 @@ def test_the_title_block_of_a_study(tmp_path):
 
 # ---- the page
 
-HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Uncertainty budget", "Loads",
-            "Mean ice resistance", "Members", "Replay", "Every key", "Study", "Provenance"]
+APPENDICES = ["Loads", "Mean ice resistance", "Members", "Every key", "Study", "Provenance"]
+HEADINGS = ["Answer", "Limits of operation", "Method", "Model and its limits", "Assumptions", "Convergence",
+            "Uncertainty budget", "Independent check", "Validation evidence", "References, symbols and standards",
+            *APPENDICES]
 
 
 @pytest.mark.slow
@@ -313,10 +315,14 @@ def test_it_holds_every_key_and_labels_what_is_assumed(page, made):
                                    f"{selector} tbody th")
     assert column("#keys") == keys
     assumed = column("#assumed")
-    assert {k for k, kind in kinds.items() if kind in ("assumed", "memory", "reported") and not k.startswith(
-        report_ensemble.PERSONAL) and report_run.applies(k, case)} <= set(assumed)
+    labelled = {k for k, kind in kinds.items() if kind in ("assumed", "memory", "reported") and not k.startswith(
+        report_ensemble.PERSONAL) and report_run.applies(k, case)}
+    computed = {k for k in labelled if k.startswith(report_ensemble.NUMERICAL)}
+    assert labelled - computed <= set(assumed) and computed and not computed & set(assumed)
+    label = "//section[@id='keys']//tr[th='solver.tolerance']"  # in the appendix, with its label
+    assert "assumed" in page.find_element("xpath", label).text
     row = page.find_element("xpath", "//section[@id='assumed']//tr[th='ice.friction']").text
-    assert "0 to 10" in row and "0.3" in row
+    assert "0.3" in row and "given" in row
 
 
 def test_figures_follow_the_dark(page):
@@ -389,8 +395,8 @@ def test_the_ink_on_the_pages(made, tmp_path):
 
 def test_the_pdf_reads_in_order_and_is_searchable(made):
     text = " ".join("\n".join(pages_of(made / "report.pdf")).split())
-    marks = [f" {k + 1} {h} " for k, h in enumerate(HEADINGS[:-3])] + [
-        f" Appendix {letter} {h} " for letter, h in zip("ABC", HEADINGS[-3:])]
+    marks = [f" {k + 1} {h} " for k, h in enumerate(HEADINGS[:-len(APPENDICES)])] + [
+        f" Appendix {letter} {h} " for letter, h in zip("ABCDEF", APPENDICES)]
     places = [text.index(mark) for mark in marks]
     assert places == sorted(places) and text.index("Owners & Sons <x>") < places[0]
     raw = re.sub(r"\s+", "", printed("pdftotext", "-raw", made / "report.pdf", "-"))

@@ -136,7 +136,7 @@ def test_every_limit_is_listed():
 
 READ = {"base", "ice.field", "ice.outlines", "water.current_table", "air.wind_table"}  # files that are read
 SHOWN = {"run.title", "reference.source", "report.client", "report.project", "report.author",
-         "report.revision"}                                                      # texts that are shown
+         "report.document", "report.revision", "report.distribution"}            # texts that are shown
 
 
 def contents(folder):

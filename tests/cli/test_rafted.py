@@ -24,9 +24,31 @@ PRESSED = changed(TOW,
 
 @pytest.mark.parametrize("shift, area", [((1, 0.5), 1.5), ((3, 0), 0), ((0, 0), 4), ((-1.5, -1.5), 0.25)])
 def test_two_squares(shift, area):
-    both = rafted.intersection(SQUARE, SQUARE + shift)
-    assert np.isclose(rafted.area(both), area, atol=1e-12)
-    assert len(rafted.overlaps([SQUARE, SQUARE + shift])) == (area > 0)
+    found = rafted.overlaps([SQUARE, SQUARE + shift])
+    assert len(found) == (area > 0) and np.isclose(sum(map(rafted.area, found)), area, atol=1e-12)
+
+
+def polygons(n, seed):
+    """Convex outlines [n, 6, 2] of 3 to 6 corners, some clockwise, the last corner repeated."""
+    rng, out = np.random.default_rng(seed), []
+    for _ in range(n):
+        corners = int(rng.integers(3, 7))
+        angle = np.sort(rng.uniform(0, 2 * np.pi, corners))[::rng.choice([-1, 1])]
+        p = rng.uniform(0, 8, 2) + rng.uniform(0.3, 1.5) * np.column_stack([np.cos(angle), np.sin(angle)])
+        out.append([*p, *[p[-1]] * (6 - corners)])
+    return np.array(out)
+
+
+def test_many_at_a_time_are_what_shapely_finds(monkeypatch):
+    """Pairs in several batches, far from the origin, of all numbers of corners and both directions."""
+    shapely = pytest.importorskip("shapely.geometry")
+    monkeypatch.setattr(rafted, "BATCH", 700)
+    some = polygons(300, 5) + [3e5, -2e5]
+    shapes = [shapely.Polygon(p) for p in some]
+    areas = [a.intersection(b).area for k, a in enumerate(shapes) for b in shapes[k + 1:]
+             if a.intersection(b).area > rafted.LEAST * min(a.area, b.area)]
+    found = [rafted.area(p) for p in rafted.overlaps(some)]
+    assert len(areas) > 1000 and np.allclose(found, areas, rtol=1e-6, atol=1e-8)
 
 
 def test_floes_that_only_touch_are_left_out():
@@ -39,7 +61,9 @@ def test_a_run(tmp_path):
     r = run(tmp_path, PRESSED)
     assert r.summary["rafted_area_m2"] > 0.3
     o, v, pose = r.dataset("/floes/offsets"), r.dataset("/floes/vertices"), r.dataset("/frames/pose")[-1]
-    found = rafted.overlaps([placed(v[o[i]:o[i + 1]], pose[i]) for i in range(len(pose))])
+    outlines = [placed(v[o[i]:o[i + 1]], pose[i]) for i in range(len(pose))]
+    longest = max(map(len, outlines))  # others are filled up, as in Run.polygon_array
+    found = rafted.overlaps([[*p, *[p[-1]] * (longest - len(p))] for p in outlines])
     total = sum(map(rafted.area, found))
     assert np.isclose(total, r.summary["rafted_area_m2"], rtol=0.05), (total, r.summary["rafted_area_m2"])
     with Reader(r.dir) as reader:

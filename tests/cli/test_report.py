@@ -414,7 +414,7 @@ def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
     seek(chrome, last)
     chrome.find_element("id", "replay-fit").click()
     assert len(over) > 3
-    assert js(chrome, "return bergtow.overlap()") == pytest.approx(sum(map(rafted.area, over)), rel=0.01)
+    assert js(chrome, "return bergtow.overlap") == pytest.approx(sum(map(rafted.area, over)), rel=0.01)
     middle = max(over, key=rafted.area).mean(axis=0)
     shade = js(chrome, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth;
         const [x, y] = bergtow.screen(0), p = bergtow.pose(0), m = bergtow.metre;

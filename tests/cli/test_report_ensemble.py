@@ -19,7 +19,6 @@ from bergtow import cli
 from bergtow.errors import RunError
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
-from bergtow.result import origins as report_case
 from bergtow.result.members import Members
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import variance as stat_budget
@@ -105,7 +104,8 @@ def test_the_answer_is_the_design_statement(tmp_path):
     """Rounded to what the interval leaves; of fields that are long enough for a tail."""
     rng = np.random.default_rng(8)
     e = Members(made_up.write(tmp_path / "out", [
-        member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
+        member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5 + 0.1 * c}, c)
+        for c in range(2) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, [], {})
     row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
@@ -128,6 +128,8 @@ def test_the_answer_is_the_design_statement(tmp_path):
     assert [started[name] for name in head] == row
     figure = next(b for b in blocks if b["kind"] == "figure")
     assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
+    one = s | {"conditions": s["conditions"][:1]}  # no chart of one point
+    assert "figure" not in [b["kind"] for b in report_ensemble.answer(e, one, [], {})]
 
 
 def test_conditions_without_a_value_are_named_beside_the_largest():
@@ -245,13 +247,12 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
                                           "every value of the range makes it")]
     assert at == sorted(at) and text.index("Assumptions") < at[0]
     assert text.count("<svg") >= 3 and str(tmp_path) not in text and "Not studied" not in text
-    answered = text[:text.index("<h2>Method")]
+    answered = text[:text.index("<h2>Limits of operation")]
     sd = f"{100 * budget['parameters']['sd'] / budget['mean']:.0f} % of the mean"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0",
-                                                      "run.title": ""})
-        assert report_ensemble.ranges({"budget": found["budget"]}) == {
-            "ice.friction": ("uniform from 0 to 1", "a book"), "ice.size": ("above 0", "admitted")}
+    told = {"assumed": [{"key": key, "low": "0.1", "high": "0.5", "source": "a paper"}
+                        for key in ("ice.friction", "body.drag.water_form")]}
+    assert report_ensemble.ranges({"budget": found["budget"]}, told) == {
+        "ice.friction": ("uniform from 0 to 1", "a book"), "body.drag.water_form": ("0.1 to 0.5", "")}
     for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
                   "width", sd):
         assert words in answered, words

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 
+from bergtow import progress
 from bergtow.cli import lacking
 from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
@@ -55,7 +56,8 @@ def guarded(name, main):
     sys.stdout, sys.stderr = _Stream(sys.stdout), _Stream(sys.stderr)
     code = 0
     try:
-        main()
+        with progress.told(name):
+            main()
     except BergtowError as error:
         code = _say(name, error, error.status)
     except ModuleNotFoundError as error:

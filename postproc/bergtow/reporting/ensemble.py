@@ -13,11 +13,12 @@ from itertools import groupby
 
 from bergtow import table as text_table
 from bergtow.errors import RunError
-from bergtow.plot import style
 from bergtow.plot import design_value as plot_design
 from bergtow.plot import ensemble as plot_ensemble
+from bergtow.reporting import document
 from bergtow.reporting import method as report_method
 from bergtow.reporting import run as report_run
+from bergtow.reporting.document import lines, table
 from bergtow.result import compared, findings
 from bergtow.result import origins as report_case
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
@@ -36,6 +37,8 @@ import numpy as np
 #: keys that no result follows from
 TONNE_FORCE = 9806.65  # N
 PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
+#: keys of the computation, not of the tow: their origin stands in the appendix, what they change under convergence
+NUMERICAL = ("solver.", "run.", "impact.", "estimate.", "ice.seed", "ice.shake", "body.x", "body.y")
 #: keys that decide the force, and stand among the assumptions wherever their values are from
 DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "water.current_y", "air.wind_x",
           "air.wind_y")
@@ -86,18 +89,6 @@ def sections(markdown):
     return intro, [part for part in parts if part[0] != "Members"]
 
 
-def worth(value, low, high, least=-np.inf):
-    """(value, interval) of a force in words: to three digits, up where the nearest lies below `least` and the value
-    does not; to the two digits that the wider side of the interval leaves; "no bound" where it has no end."""
-    factor, unit = style.scale([value], "N")
-    high = text_table.bound(value, high)
-    place = text_table.last_place(value / factor, low / factor, high / factor)
-    said = style.quantity(text_table.designed(value, least), "N")
-    if place is None:
-        return said, "–"
-    return said, f"{' to '.join(text_table.to_place(x / factor, place) for x in (low, high))} {unit}"
-
-
 MARGIN = 1.05  # times the largest value simulated: what is less has little room for what was not seen
 #: marks behind a design value, and their footnotes
 FOOTNOTES = {
@@ -122,16 +113,17 @@ def design_row(c):
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
-        value, interval = worth(d["value"], *d["interval_95"], d["largest"])
+        value, interval = text_table.stated(d["value"], *d["interval_95"], "N", d["largest"])
         return [value + marks(d), interval]
-    return [unbroken(c["label"]), *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
+    return [unbroken(c["label"]), *cells(tow), *cells(tension), text_table.stated(tow["mean"], *tow["mean_95"], "N")[0],
             report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
             str(tow["fields"]), text_table.number(tow["hours"])]
 
 
-def answer(e, s, cases, results):
-    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for. cases:
-    those of statement.cases(); results: those of other commands, as results_beside() has them."""
+def answer(e, s, cases, results, told=None):
+    """Blocks of the first chapter: the statement, the table, the figure where there is more than one condition, line
+    and vessel, what it holds for. cases: those of statement.cases(); results: those of other commands, as
+    results_beside() has them; told: answer.json of bergtow design, which knows vessel, line and ranges."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
             "largest simulated", "in the start", "fields", "hours"]
@@ -144,9 +136,10 @@ def answer(e, s, cases, results):
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), loads_text.holds_for(s)
-    figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
-        s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
-        lambda key: reading(key, e.units[key])[0]))
+    figure = None if len(s["conditions"]) < 2 else report_run.picture(
+        "design", "Design tow force of each condition", lambda: plot_design.draw(
+            s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
+            lambda key: reading(key, e.units[key])[0]))
     out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
     out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
     carried = "".join(cell for row in rows for cell in row[1:])
@@ -155,7 +148,8 @@ def answer(e, s, cases, results):
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
-             "rows": report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
+             "rows": report_method.beyond(results, e)[1:] if told else
+             report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
     return out + [lines(held)] * bool(held)
 
 
@@ -190,14 +184,6 @@ def without_value(s, value):
     reached = f", but {report_run.force(most)} in the simulation: the largest value of this study is not known" \
         if most > value else ""
     return f"No value for {names}{reached}. "
-
-
-def lines(*some, faint=False):
-    return {"kind": "text", "lines": list(some), "warnings": [], "faint": faint}
-
-
-def table(head, rows):
-    return {"kind": "table", "head": head, "rows": rows}
 
 
 def kind_of(warning):
@@ -337,13 +323,13 @@ def results_beside(e, also):
     return out
 
 
-def beside(results):
+def beside(results, told=None):
     """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
     out = []
     for name, (heading, _) in analysis.KINDS.items():
         if name in results:
             out.append(of_part(name, analysis.chapter(name, results[name])))
-        elif name in NOT_STUDIED:
+        elif name in NOT_STUDIED and not (name == "budget" and told and told.get("assumed")):
             out.append((heading, [lines(NOT_STUDIED[name])]))
     return out
 
@@ -382,13 +368,43 @@ def varied(e, runs):
     return [of_all(some) for some in zip(*(values for _, values, *_ in runs))]
 
 
-def ranges(results):
-    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what
-    the program admits."""
-    out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
+def ranges(results, told):
+    """{key: (range, its source)} of what the uncertainty budget varied, or the answer of bergtow design, whose own
+    table has the sources."""
+    out = {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])}
     for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
     return out
+
+
+def of_answer(found):
+    """(sentence, [(heading, blocks)]) of the answer of bergtow design; ("", []) without one."""
+    if found is None:
+        return "", []
+    from bergtow.text import answer as answer_text
+    said = blocks(scrubbed(answer_text.text(found, markdown=True)))
+    starts = [k for k, b in enumerate(said) if b["kind"] == "heading"]
+    parts_of = [(said[a]["text"], said[a + 1:b]) for a, b in zip(starts, [*starts[1:], len(said)])]
+    return answer_text.sentence(found), [part for part in parts_of if part[0] != answer_text.HEADINGS["plan"]]
+
+
+def governs(s):
+    """The condition of the statistics with the largest load, by document.load."""
+    return max(s["conditions"], key=lambda c: document.load(c) or -np.inf)
+
+
+def independent_check(e, s):
+    """(blocks of the check, rows of the estimates) of the first field of the condition that governs."""
+    c = governs(s)
+    rows = next(of.members for of in e.conditions() if of.index == c["index"])
+    for m in rows[e.status[rows] == FINISHED]:
+        try:
+            with Run(e.folder(m)) as run:
+                estimates = report_run.estimates(run)
+                return document.check(run, estimates), estimates
+        except RunError:
+            continue
+    return document.check(None, []), []
 
 
 def replays(e, place):
@@ -414,16 +430,26 @@ def context(folder, place=None, given=None, also=()):
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
     warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
+    told = document.answer_beside(e.path)
+    sentence, tables = of_answer(told)
+    checked, estimates = independent_check(e, s)
+    drawn = pictures(e, options, s)
+    if len(s["conditions"]) < 2:  # a chart of one point
+        drawn = {name: p for name, p in drawn.items() if not name.startswith(("sweep", "map", "variants"))}
     return {
-        "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
-        "answer": answer(e, s, cases, results),
+        "title": scrubbed(report_run.breakable(e.title)), "block": block,
+        "marked": report_case.marked(block),
+        "sentence": scrubbed(sentence), "answer": answer(e, s, cases, results, told), "tables": tables,
+        "operation": document.operation(s, cases, values, told), "check": checked, "evidence": document.evidence(),
+        "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],
-        "method": report_method.method(s, cases), "limits": report_method.limits(cases),
+        "method": report_method.method(s, cases), "limits": report_method.limits(cases, bool(told and told["speeds"])),
         "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
-                    and not v.key.startswith(PERSONAL) and any(report_run.applies(v.key, r[2]) for r in runs)],
-        "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
-        "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
+                    and not v.key.startswith(PERSONAL + NUMERICAL)
+                    and any(report_run.applies(v.key, r[2]) for r in runs)],
+        "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
+        "beside": beside(results, told), "chapters": parts(found, drawn),
         "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),

@@ -4,6 +4,7 @@ from what was simulated."""
 import numpy as np
 
 from bergtow.result import compared
+from bergtow.result.origins import short as in_short
 from bergtow.result.origins import source_of_ice
 from bergtow.result.run import case_value
 from bergtow.stats import alike as stat_alike
@@ -117,9 +118,9 @@ def _vessel(case):
     return "" if np.isfinite(case.bollard_pull) else "No vessel is judged: the case names no bollard pull."
 
 
-def limits(cases):
+def limits(cases, vessel=False):
     """Sentences on what the model leaves out, the gravest first; what is not so of all cases, with its conditions.
-    cases: those of statement.cases()."""
+    cases: those of statement.cases(); vessel: is one judged?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if not cases:
@@ -131,7 +132,7 @@ def limits(cases):
     out += of_each(lambda case: _ice(case, kappa, pressure))
     out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
                "there are no waves.")
-    for say in (_pack, _end, _line, _vessel):
+    for say in (_pack, _end, _line, *[_vessel] * (not vessel)):
         out += of_each(say)
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
@@ -166,7 +167,7 @@ def holds(cases):
     said = [f"{label}: {number(v['value'])} m/s" + (
         f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})" if np.isfinite(v["interval_95"]).all()
         else "") for label, v in made]
-    return [row("tow speed asked for", lambda case: case.texts.get("tow.speed", "–")),
+    return [row("tow speed asked for", lambda case: in_short(case.texts.get("tow.speed", "–"))),
             *[("speed made good", "; ".join(said))] * bool(said),
             row("breaking load of the line", _breaking), row("bollard pull of the vessel", _pull)]
 

@@ -10,7 +10,7 @@ import hashlib
 from datetime import datetime, timezone
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import arguments, progress, writing
 from bergtow.errors import USAGE, BergtowError, RunError
 from bergtow.plot import vector
 from bergtow.reporting import pdf
@@ -37,7 +37,7 @@ def templates():
 
 def script():
     """The replay's script, as one function."""
-    parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "replay_controls.js")]
+    parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "raster.js", "replay_controls.js")]
     return "(() => {\n" + "\n".join(parts) + "})();\n"
 
 
@@ -53,10 +53,9 @@ def quoted(text):
     return '"' + "".join(c if c.isalnum() and c.isascii() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 
-def head_of_pages(title, revision):
+def head_of_pages(title, right):
     """The running head and foot of the printed page."""
     left = title if len(title) <= MOST_OF_TITLE else title[:MOST_OF_TITLE - 1].rstrip() + "…"
-    right = f"revision {revision}" if revision not in ("", "–") else ""
     box = 'font: 7.6pt "DejaVu Sans", Verdana, sans-serif; color: #5a6672; vertical-align: bottom; padding-bottom: 4mm;'
     foot = box.replace("bottom; padding-bottom", "top; padding-top")
     return (f"@page {{ @top-left {{ content: {quoted(left)}; width: 75%; text-align: left; {box} }}\n"
@@ -65,11 +64,11 @@ def head_of_pages(title, revision):
             f'@bottom-right {{ content: counter(page) " of " counter(pages); text-align: right; {foot} }} }}\n')
 
 
-def css(title, revision):
+def css(title, marked):
     light, dark = vector.styles()
     return "\n".join([(PAGE / "report.css").read_text(encoding="utf-8"), f":root {{ {light} }}",
                       f"@media (prefers-color-scheme: dark) {{ @media not print {{ :root {{ {dark} }} }} }}",
-                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, revision)])
+                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, marked)])
 
 
 def render(template, context, paper=False):
@@ -80,7 +79,7 @@ def render(template, context, paper=False):
                                                      paper=paper,
                                                      mark=writing.MARK,
                                                      policy=policy(code),
-                                                     css=css(context["title"], context["revision"]),
+                                                     css=css(context["title"], context["marked"]),
                                                      made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
 
 
@@ -135,9 +134,12 @@ def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True,
     """The report of a folder in one or more files. given: {name: text or None} of the title block; also: folders of
     analyses; size: MB of the replay's data. Errors: RunError."""
     given = dict.fromkeys(TITLE_BLOCK) | (given or {})
-    for path, text in pages(folder, paths, given, also, size, compressed).items():
+    with progress.doing(f"report of {folder.name or folder}"):
+        made = pages(folder, paths, given, also, size, compressed)
+    for path, text in made.items():
         if path.suffix.lower() == ".pdf":
-            pdf.write(text, path, force)
+            with progress.doing(path.name):
+                pdf.write(text, path, force)
         else:
             writing.write_text(text, path, force)
         print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 
+from bergtow import progress
+from bergtow import table as text_table
 from bergtow.errors import RunError
 from bergtow.plot import style, vector
 from bergtow.plot import field as plot_field
@@ -12,6 +14,7 @@ from bergtow.plot import resistance as plot_resistance
 from bergtow.reporting.replay import LIMIT, Replay
 from bergtow.result import origins as report_case
 from bergtow.result.at_least import AtLeast
+from bergtow.result.run import case_value
 
 import numpy as np
 
@@ -55,17 +58,10 @@ def force(value):
 
 
 def with_interval(mean, low, high):
-    """(mean, 95 % interval) in words, to the two digits that the interval leaves; a dash for what is not known."""
-    if not np.isfinite(mean):
-        return "–", "–"
-    if not np.isfinite(low) or high <= low:
-        return force(mean), "–"
-    half = (high - low) / 2
-    if half < 1e-6 * abs(mean):
-        return force(mean), "no scatter"
-    factor, unit = style.scale([mean], "N")
-    digits = len(style.short(half / factor, 2).partition(".")[2])
-    return f"{mean / factor:.{digits}f} {unit}", f"{low / factor:.{digits}f} to {high / factor:.{digits}f} {unit}"
+    """(mean, 95 % interval) of a force in words, to the digits that the interval leaves."""
+    if np.isfinite([mean, low, high]).all() and 0 <= high - low < 2e-6 * abs(mean):
+        return force(mean), "no scatter" if high > low else "–"
+    return text_table.stated(mean, low, high, "N")
 
 
 def share(value):
@@ -77,11 +73,12 @@ def picture(name, title, draw):
     """A figure as {"kind", "name", "title", "svg"}; {"kind", "name", "title", "why"} where there is nothing to draw;
     None where it says so itself."""
     out = {"kind": "figure", "name": name, "title": title}
-    try:
-        figure = draw()
-    except RunError as error:
-        return out | {"why": f"{error.reason}; {error.remedy}"}
-    return out | {"svg": vector.of_figure(figure, name, title)} if figure else None
+    with progress.doing(f"picture: {title}"):
+        try:
+            figure = draw()
+        except RunError as error:
+            return out | {"why": f"{error.reason}; {error.remedy}"}
+        return out | {"svg": vector.of_figure(figure, name, title)} if figure else None
 
 
 def pictures(run):
@@ -308,8 +305,15 @@ def stamp(run):
 
 
 def applies(key, case):
-    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape."""
+    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape,
+    one of walls beside walls, one of crushing where ice is crushed."""
     if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
+        return False
+    edges = {case.get("domain.ends"), case.get("domain.sides")}
+    if key.startswith("domain.wall_") and "wall" not in edges or key == "domain.ahead" and "moving" not in edges:
+        return False
+    if key.startswith("ice.crushing.") and key != "ice.crushing.pressure" and not case_value(
+            case, "ice.crushing.pressure", 0.0) > 0:
         return False
     return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
 
@@ -336,11 +340,13 @@ def breakable(text):
 def context(run, limit=LIMIT, compress=True, given=None):
     """Everything that page/run.html sets. Errors: RunError."""
     values = [replace(v, value=report_case.short(v.value)) for v in report_case.values(run)]
-    replay = Replay(run, limit, compress) if run.n_frames else None
+    with progress.doing(f"replay of {run.n_frames} frames"):
+        replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
     block = report_case.title_block(run.case, run.attributes, given or {})
     return {
-        "block": block if any(value != "–" for _, value in block[:4]) else [], "revision": dict(block)["revision"],
+        "block": block if any(value != "–" for _, value in block[:len(report_case.TITLE_BLOCK)]) else [],
+        "marked": report_case.marked(block),
         "title": breakable(run.summary.get("title")
                            or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
         "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,

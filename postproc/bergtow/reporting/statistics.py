@@ -7,7 +7,7 @@ are named, and the exit code is 4, so that no script takes a part for the whole;
 """
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import arguments, progress, writing
 from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero
 from bergtow.errors import RunError
 from bergtow.result.members import EXCLUDABLE, FINISHED, Members
@@ -123,7 +123,8 @@ def perform(a):
     folder = a.output or e.path
     for name in ("statistics.json", "statistics.csv"):
         writing.may_write(folder / name, a.force)
-    s = conditions.statistics(e, a)
+    with progress.doing(f"{e.n} members"):
+        s = conditions.statistics(e, a)
     write(s, folder, a.force)
     print(ensemble_text.report(s, a.markdown))
     print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")

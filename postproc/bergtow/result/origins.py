@@ -5,20 +5,16 @@ default.
 What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
 case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
 """
-import json
 import re
 import shlex
-import subprocess
 from dataclasses import dataclass
 from datetime import datetime, timezone
-
-from bergtow._program import program_path
-from bergtow.errors import BergtowError
 
 import numpy as np
 import yaml
 
-TITLE_BLOCK = ("client", "project", "author", "revision")
+TITLE_BLOCK = ("client", "project", "author", "document", "revision", "distribution")
+NAMES = {"document": "document number"}  #: of the title block, where the key is not the name
 
 #: kind: what the label says
 KINDS = {
@@ -211,9 +207,17 @@ def title_block(case, attributes, given):
     """Rows (what, value) of the title block: what is given on the command line, or in the section `report` of a case,
     {key: text}; the date, and the program by its attributes."""
     rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
-    return [(name, scrubbed(" ".join(value.split())) if value not in ("", "none") else "–") for name, value in rows] + [
+    return [(NAMES.get(name, name), scrubbed(" ".join(value.split())) if value not in ("", "none") else "–")
+            for name, value in rows] + [
         ("date", datetime.now(timezone.utc).strftime("%Y-%m-%d")),
         ("program", f"bergtow {attributes.get('version', '')}, revision {attributes.get('revision', 'unknown')}")]
+
+
+def marked(block):
+    """What tells a document from its other issues, for every page: its number and revision, of title_block()."""
+    found = dict(block)
+    number, revision = found[NAMES["document"]], found["revision"]
+    return ", ".join([number] * (number != "–") + [f"revision {revision}"] * (revision != "–"))
 
 
 def scrubbed(text):
@@ -230,26 +234,6 @@ def short(value):
         number = float(found[0])
         return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"
     return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", digits, value)
-
-
-def _range(key):
-    """What the program admits for a key, an entry of --list-keys --json."""
-    if key["type"] == "choice":
-        return ", ".join(key["choices"])
-    if "least" not in key:
-        return ""
-    low, high, unit = key["least"], key["most"], key.get("unit", "").replace("-", "")
-    low = f"above {low:g}" if key.get("above_least") else f"{low:g}"
-    return f"{low} to {'below ' if key.get('below_most') else ''}{high:g} {unit}".strip()
-
-
-def ranges():
-    """{key: range that the program admits}; {} where it cannot be asked."""
-    try:
-        said = subprocess.run([program_path(), "--list-keys", "--json"], capture_output=True, timeout=60, check=True)
-        return {key["name"]: _range(key) for key in json.loads(said.stdout)["keys"]}
-    except (BergtowError, OSError, ValueError, subprocess.SubprocessError):
-        return {}
 
 
 def preface(text):

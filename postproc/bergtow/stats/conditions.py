@@ -2,6 +2,7 @@
 """Statistics of an ensemble: the design tow force, loads with return levels, means with intervals, estimates beside
 them, distributions, peaks of collisions, sensitivity."""
 
+from bergtow import progress
 from bergtow.errors import RunError
 from bergtow.result import at_least, findings
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, WAITING
@@ -214,8 +215,8 @@ def statistics(e, options):
     dropped = e.exclude(options.exclude) if options.exclude else {}
     if not len(e.used):
         raise nothing_to_count(e, dropped)
-    members = {int(m): member(e, m) for m in e.used}
-    conditions = [condition(e, c, members, options) for c in e.conditions()]
+    members = {int(m): member(e, m) for m in progress.each("mean of member", e.used)}
+    conditions = [condition(e, c, members, options) for c in progress.each("statistics of condition", e.conditions())]
     return {
         "title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
         "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),

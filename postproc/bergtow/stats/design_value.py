@@ -388,7 +388,7 @@ def _holds_for(e, case):
     """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
     if case is None:
         return ""
-    said = [(case.texts[key], before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
+    said = [(in_short(case.texts[key]), before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
             for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters
             and (key != "body.length" or case.texts.get("body.shape") != "polygon")]
     return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)

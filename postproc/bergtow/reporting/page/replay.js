@@ -10,7 +10,7 @@
 // the values shown, speed and force, are those of the nearest frame. A floe that goes farther between two frames than
 // its speed allows was put elsewhere by a moving window: it is not interpolated.
 //
-// The page puts this file and replay_controls.js into one function, in this order.
+// The page puts this file, raster.js and replay_controls.js into one function, in this order.
 const $ = (id) => document.getElementById(id);
 const root = $("replay");
 const head = JSON.parse($("replay-head").textContent);
@@ -22,6 +22,8 @@ const state = {
     follow: head.follow, cx: 0, cy: 0, scale: 1,
 };
 let data = null;      // decoded arrays
+const [X0, DX] = head.quanta.x, [Y0, DY] = head.quanta.y, DYAW = head.quanta.yaw[1], [PX, PY] = head.period;
+const shown = {n: 0, floe: new Uint32Array(4 * N), at: new Float64Array(12 * N)};  // in view: up to four images each
 let scheduled = false;
 
 // ---- data
@@ -62,11 +64,15 @@ async function load() {
         area: new Float32Array(area), body: new Float64Array(body),
         offset: new Uint32Array(N + 1), radius: new Float32Array(N),
     };
+    let most = 4;
     for (let i = 0; i < N; i++) {
         data.offset[i + 1] = data.offset[i] + data.counts[i];
+        most = Math.max(most, data.counts[i]);
         for (let v = data.offset[i]; v < data.offset[i + 1]; v++)
             data.radius[i] = Math.max(data.radius[i], Math.hypot(data.vertices[2 * v], data.vertices[2 * v + 1]));
     }
+    paint.x = new Float64Array(most);
+    paint.y = new Float64Array(most);
 }
 
 const clampFrame = (k) => Math.max(0, Math.min(T - 1, k));
@@ -94,20 +100,31 @@ function value(kind, frame, i) {
 
 const image = (d, period) => period > 0 ? d - period * Math.round(d / period) : d;
 
-// Pose of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth.
-function floePose(i, p) {
-    const [x0, dx] = head.quanta.x, [y0, dy] = head.quanta.y, dyaw = head.quanta.yaw[1];
+// Pose [x, y, yaw] of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth; in `out`.
+function floePose(i, p, out = [0, 0, 0]) {
     const k = Math.min(Math.floor(p), T - 1), a = k * N + i, w = p - k;
-    const pose = [x0 + dx * data.x[a], y0 + dy * data.y[a], dyaw * data.yaw[a]];
-    if (!w || k + 1 >= T) return pose;
-    const b = a + N, x = x0 + dx * data.x[b], y = y0 + dy * data.y[b];
-    const ux = image(x - pose[0], head.period[0]), uy = image(y - pose[1], head.period[1]);
+    const xa = X0 + DX * data.x[a], ya = Y0 + DY * data.y[a];
+    out[0] = xa;
+    out[1] = ya;
+    out[2] = DYAW * data.yaw[a];
+    if (!w || k + 1 >= T) return out;
+    const b = a + N, xb = X0 + DX * data.x[b], yb = Y0 + DY * data.y[b];
+    const ux = image(xb - xa, PX), uy = image(yb - ya, PY);
     const between = head.times[k + 1] - head.times[k];
     const reach = 2 * (value("speed", k, i) + value("speed", k + 1, i)) * between + 2 * data.radius[i];
-    if (Math.hypot(ux, uy) > reach) return w < 0.5 ? pose : [x, y, dyaw * data.yaw[b]];
+    if (ux * ux + uy * uy > reach * reach) {
+        if (w < 0.5) return out;
+        out[0] = xb;
+        out[1] = yb;
+        out[2] = DYAW * data.yaw[b];
+        return out;
+    }
     let turn = (data.yaw[b] - data.yaw[a]) & 65535;
     if (turn > 32767) turn -= 65536;
-    return [pose[0] + w * ux, pose[1] + w * uy, pose[2] + w * dyaw * turn];
+    out[0] += w * ux;
+    out[1] += w * uy;
+    out[2] += w * DYAW * turn;
+    return out;
 }
 
 function bodyPose(b, p) {
@@ -213,6 +230,16 @@ function level(c, v) {
     return Math.min(LEVELS - 1, Math.floor(Math.pow(share, c.power) * LEVELS));
 }
 
+// Levels of colour of a colouring: of each number that a value is stored as, or of each floe.
+function levelsOf(c) {
+    if (!c.levels) {
+        const top = head.quanta[c.kind], n = top === undefined ? N : 65536;
+        const of = (k) => top === undefined ? data[c.kind][k] : top * (k / 65535) ** 2;
+        c.levels = Uint8Array.from({length: n}, (_, k) => level(c, of(k)));
+    }
+    return c.levels;
+}
+
 function path(g, outline, pose, o) {
     const c = Math.cos(pose[2]), s = Math.sin(pose[2]);
     g.beginPath();
@@ -220,58 +247,75 @@ function path(g, outline, pose, o) {
     g.closePath();
 }
 
-// Floes that are in view, as [floe, x, y, yaw] one after the other, sorted into levels of colour.
+// What is in view of the floes, images of those that reach over the edge among them: {n, floe, at: x, y, yaw of each}.
 function visible(p, C, o) {
-    const bins = Array.from({length: LEVELS}, () => []), colouring = head.colouring[state.colour];
-    const frame = nearest(), [Px, Py] = head.period;
+    const pose = [0, 0, 0];
     const low = toWorld(0, canvas.height, o), high = toWorld(canvas.width, 0, o);
-    const see = (x, y, r) => x + r > low[0] && x - r < high[0] && y + r > low[1] && y - r < high[1];
+    let n = 0;
     for (let i = 0; i < N; i++) {
-        const pose = floePose(i, p), r = data.radius[i];
-        const x = C[0] + image(pose[0] - C[0], Px), y = C[1] + image(pose[1] - C[1], Py);
-        const bin = bins[level(colouring, value(colouring.kind, frame, i))];
-        // Images of floes that reach over the edge.
-        const kx = Px > 0 && Math.abs(x - C[0]) + r > Px / 2 ? [0, x > C[0] ? -Px : Px] : [0];
-        const ky = Py > 0 && Math.abs(y - C[1]) + r > Py / 2 ? [0, y > C[1] ? -Py : Py] : [0];
-        for (const ax of kx) for (const ay of ky) if (see(x + ax, y + ay, r)) bin.push(i, x + ax, y + ay, pose[2]);
+        floePose(i, p, pose);
+        const r = data.radius[i], x = C[0] + image(pose[0] - C[0], PX), y = C[1] + image(pose[1] - C[1], PY);
+        const ex = PX > 0 && Math.abs(x - C[0]) + r > PX / 2 ? (x > C[0] ? -PX : PX) : 0;
+        const ey = PY > 0 && Math.abs(y - C[1]) + r > PY / 2 ? (y > C[1] ? -PY : PY) : 0;
+        for (let kx = 0; kx < (ex ? 2 : 1); kx++) for (let ky = 0; ky < (ey ? 2 : 1); ky++) {
+            const u = x + kx * ex, v = y + ky * ey;
+            if (u + r <= low[0] || u - r >= high[0] || v + r <= low[1] || v - r >= high[1]) continue;
+            shown.floe[n] = i;
+            shown.at[3 * n] = u;
+            shown.at[3 * n + 1] = v;
+            shown.at[3 * n++ + 2] = pose[2];
+        }
     }
-    return bins;
+    shown.n = n;
+    return shown;
 }
 
+const LARGE = 30;   // pixels of a floe, from which on there are few, and each gets an outline
+const SEAMS = 5;    // pixels of a floe, below which it has no seam, so that a far view is not the darker
+const DOT = 4;      // pixels of a floe, below which it is a square of its area, and what it lies over cannot be seen
+
 function drawFloes(g, p, C, o) {
-    const table = head.colouring[state.colour].table, bins = visible(p, C, o), turn = head.geographic, s = state.scale;
+    const {table, kind} = head.colouring[state.colour], levels = levelsOf(head.colouring[state.colour]);
+    const {n, floe, at} = visible(p, C, o), turn = head.geographic, s = state.scale, frame = nearest();
     const halfW = canvas.width / 2 - state.cx * s, halfH = canvas.height / 2 + state.cy * s;
-    const size = N ? Math.sqrt(data.area[0]) * s : 0;
-    g.strokeStyle = head.style.water;
-    g.lineWidth = Math.max(0.3, Math.min(1.2, 0.035 * size));
-    bins.forEach((bin, k) => {
-        if (!bin.length) return;
-        g.fillStyle = `rgb(${table[k]})`;
-        g.beginPath();
-        for (let j = 0; j < bin.length; j += 4) {
-            const i = bin[j], x = bin[j + 1] - o[0], y = bin[j + 2] - o[1], r = data.radius[i] * s;
-            if (r < 1) {  // smaller than two pixels
-                const a = Math.max(0.5, 0.85 * r);
-                g.rect(halfW + (turn ? y : x) * s - a, halfH - (turn ? x : y) * s - a, 2 * a, 2 * a);
-                continue;
-            }
-            const c = Math.cos(bin[j + 3]), d = Math.sin(bin[j + 3]), first = data.offset[i], end = data.offset[i + 1];
-            for (let v = first; v < end; v++) {
-                const vx = data.vertices[2 * v], vy = data.vertices[2 * v + 1];
-                const wx = x + c * vx - d * vy, wy = y + d * vx + c * vy;
-                const sx = halfW + (turn ? wy : wx) * s, sy = halfH - (turn ? wx : wy) * s;
-                if (v === first) g.moveTo(sx, sy); else g.lineTo(sx, sy);
-            }
+    const ground = rgba(...ofText(head.style.water)), over = head.rafts ? ofText(head.style.rafted) : null;
+    const {x, y} = paint, vertices = data.vertices, stored = kind in head.quanta ? data[kind] : null;
+    beginPaint(canvas.width, canvas.height);
+    g.beginPath();
+    for (let j = 0; j < n; j++) {
+        const i = floe[j], u = at[3 * j] - o[0], v = at[3 * j + 1] - o[1], first = data.offset[i];
+        const size = 2 * data.radius[i] * s, mx = halfW + (turn ? v : u) * s, my = halfH - (turn ? u : v) * s;
+        const colour = table[levels[stored ? stored[i + frame * N] : i]];
+        if (size < DOT) {
+            const half = 0.5 * Math.sqrt(data.area[i]) * s;
+            x[0] = x[3] = mx - half;
+            x[1] = x[2] = mx + half;
+            y[0] = y[1] = my - half;
+            y[2] = y[3] = my + half;
+            fillPolygon(4, colour, ground, 0, null);
+            continue;
+        }
+        const c = s * Math.cos(at[3 * j + 2]), d = s * Math.sin(at[3 * j + 2]), m = data.offset[i + 1] - first;
+        for (let k = 0; k < m; k++) {
+            const vx = vertices[2 * (first + k)], vy = vertices[2 * (first + k) + 1];
+            const wx = c * vx - d * vy, wy = d * vx + c * vy;
+            x[k] = mx + (turn ? wy : wx);
+            y[k] = my - (turn ? wx : wy);
+        }
+        if (size > LARGE) {
+            for (let k = 0; k < m; k++) if (k) g.lineTo(x[k], y[k]); else g.moveTo(x[k], y[k]);
             g.closePath();
         }
-        g.fill();
-        if (size > 5) g.stroke();
-    });
-    if (head.rafts) drawOverlaps(g, bins, o);
+        fillPolygon(m, colour, ground, Math.max(0, Math.min(1, (size - SEAMS) / SEAMS)), over);
+    }
+    endPaint(g);
+    g.strokeStyle = head.style.water;
+    g.lineWidth = 1.2;
+    g.stroke();
     const hover = state.hover;
     if (hover === null || hover < 0) return;
-    for (const bin of bins) for (let j = 0; j < bin.length; j += 4) if (bin[j] === hover) {
-        path(g, outlineOf(hover), bin.slice(j + 1, j + 4), o);
+    for (let j = 0; j < n; j++) if (floe[j] === hover) {
+        path(g, outlineOf(hover), at.subarray(3 * j, 3 * j + 3), o);
         g.strokeStyle = "#ffffff";
         g.lineWidth = 3;
         g.stroke();
@@ -279,76 +323,6 @@ function drawFloes(g, p, C, o) {
         g.lineWidth = 1.2;
         g.stroke();
     }
-}
-
-// Floes over each other: the intersections of their outlines, pair by pair, of those that are large enough to be seen.
-// As postproc/rafted.py.
-
-const LEAST_OVERLAP = 1e-3, SEEN = 3;  // of a floe's area: less is the slop of the solver; pixels
-
-// Convex polygon a cut by convex polygon b, both anticlockwise [Sutherland & Hodgman 1974].
-function intersection(a, b) {
-    for (let k = 0; k < b.length && a.length; k++) {
-        const p = b[k], q = b[(k + 1) % b.length], ex = q[0] - p[0], ey = q[1] - p[1], out = [];
-        const side = (v) => ex * (v[1] - p[1]) - ey * (v[0] - p[0]);
-        let from = a[a.length - 1], before = side(from);
-        for (const v of a) {
-            const now = side(v);
-            if ((now >= 0) !== (before >= 0)) {
-                const w = before / (before - now);
-                out.push([from[0] + w * (v[0] - from[0]), from[1] + w * (v[1] - from[1])]);
-            }
-            if (now >= 0) out.push(v);
-            from = v;
-            before = now;
-        }
-        a = out;
-    }
-    return a;
-}
-
-function areaOf(a) {
-    let sum = 0;
-    for (let k = 0, j = a.length - 1; k < a.length; j = k++) sum += a[j][0] * a[k][1] - a[k][0] * a[j][1];
-    return sum / 2;
-}
-
-// Outline at a pose [x, y, yaw].
-function placed(i, x, y, yaw) {
-    const c = Math.cos(yaw), s = Math.sin(yaw);
-    return outlineOf(i).map(([u, v]) => [x + c * u - s * v, y + s * u + c * v]);
-}
-
-function overlaps(bins) {
-    const shown = [], out = [];
-    let widest = 0;
-    for (const bin of bins) for (let j = 0; j < bin.length; j += 4) {
-        const r = data.radius[bin[j]];
-        if (r * state.scale < SEEN) continue;
-        shown.push({i: bin[j], x: bin[j + 1], y: bin[j + 2], yaw: bin[j + 3], r, outline: null});
-        widest = Math.max(widest, r);
-    }
-    shown.sort((a, b) => a.x - b.x);
-    const outline = (f) => f.outline || (f.outline = placed(f.i, f.x, f.y, f.yaw));
-    shown.forEach((a, k) => {
-        for (let m = k + 1; m < shown.length && shown[m].x - a.x < a.r + widest; m++) {
-            const b = shown[m], reach = a.r + b.r;
-            if ((a.x - b.x) ** 2 + (a.y - b.y) ** 2 >= reach * reach) continue;
-            const both = intersection(outline(a), outline(b));
-            if (areaOf(both) > LEAST_OVERLAP * Math.min(data.area[a.i], data.area[b.i])) out.push(both);
-        }
-    });
-    return out;
-}
-
-function drawOverlaps(g, bins, o) {
-    g.fillStyle = head.style.rafted;
-    g.beginPath();
-    for (const polygon of overlaps(bins)) {
-        polygon.forEach((v, k) => g[k ? "lineTo" : "moveTo"](...toScreen(...v, o)));
-        g.closePath();
-    }
-    g.fill();
 }
 
 function outlineOf(i) {

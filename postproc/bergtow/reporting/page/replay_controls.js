@@ -97,10 +97,8 @@ function mean(g, s, line, ratio) {
     g.stroke();
 }
 
-function drawChart() {
-    if (!curve) return;
-    const g = chart.getContext("2d"), ratio = window.devicePixelRatio || 1, s = chartScale(ratio);
-    const look = getComputedStyle(root), colour = (name) => look.getPropertyValue(name).trim();
+// All of the chart but for the cursor.
+function drawCurves(g, s, ratio, colour) {
     g.clearRect(0, 0, chart.width, chart.height);
     if (curve.window) {
         g.fillStyle = colour("--shade");
@@ -146,6 +144,23 @@ function drawChart() {
         g.lineTo(x + 5 * ratio, s.top);
         g.fill();
     }
+}
+
+const curves = document.createElement("canvas");  // what the chart shows at any time of the replay
+
+function drawChart() {
+    if (!curve) return;
+    const g = chart.getContext("2d"), ratio = window.devicePixelRatio || 1, s = chartScale(ratio);
+    const look = getComputedStyle(root), colour = (name) => look.getPropertyValue(name).trim();
+    const drawn = `${chart.width} ${chart.height} ${ratio} ${colour("--ink")}`;
+    if (curves.drawn !== drawn) {
+        curves.drawn = drawn;
+        curves.width = chart.width;
+        curves.height = chart.height;
+        drawCurves(curves.getContext("2d"), s, ratio, colour);
+    }
+    g.clearRect(0, 0, chart.width, chart.height);
+    g.drawImage(curves, 0, 0);
     const x = s.x(timeAt(state.p));
     g.strokeStyle = colour("--cursor");
     g.lineWidth = 2 * ratio;
@@ -421,10 +436,7 @@ window.bergtow = {
     pose: (i) => floePose(i, playhead()),
     value: (kind, i) => value(kind, nearest(), i),
     body: (b) => bodyPose(b, playhead()),
-    overlap: () => {  // area of floes over each other, pair by pair, that is in view, m²
-        const p = playhead();
-        return overlaps(visible(p, centre(p), origin(p))).reduce((sum, polygon) => sum + areaOf(polygon), 0);
-    },
+    get overlap() { return paint.over / 255 / state.scale ** 2; },  // area painted as floes over each other, m²
     screen: (i) => {  // where floe i is drawn, CSS pixels from the canvas's corner
         const p = playhead(), C = centre(p), pose = floePose(i, p);
         const x = C[0] + image(pose[0] - C[0], head.period[0]), y = C[1] + image(pose[1] - C[1], head.period[1]);

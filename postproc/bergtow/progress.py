@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""What a command is at, said while it works: a line after every few seconds of silence, none of a quick one.
+
+A thread says it, since what takes long is often one call of NumPy or matplotlib that comes back at its end alone.
+"""
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+EVERY = 8.0  # s
+
+_at = []  # what the command is at, the innermost last
+
+
+@contextmanager
+def doing(what):
+    """with doing("drawing the ice field"): ..."""
+    _at.append(what)
+    try:
+        yield
+    finally:
+        _at.pop()
+
+
+def each(what, items):
+    """The items of a list, one after the other, each with its place among them: "condition 2 of 5"."""
+    for k, item in enumerate(items):
+        with doing(f"{what} {k + 1} of {len(items)}"):
+            yield item
+
+
+@contextmanager
+def told(name):
+    """Say on standard error what doing() names, within the block. name: of the command."""
+    over, began = threading.Event(), time.monotonic()
+    def tell():
+        while not over.wait(EVERY):
+            if at := list(_at):
+                print(f"{name}: {time.monotonic() - began:.0f} s: {', '.join(at)}", file=sys.stderr, flush=True)
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""What a document needs beside its numbers, of a marine warranty surveyor's questions: limits of operation, a check by
+hand, the evidence there is, sources, symbols, standards. Blocks as those of reporting/ensemble.py."""
+import numpy as np
+
+from bergtow.result import findings
+from bergtow.result.origins import short as in_short
+from bergtow.table import number, quantity
+from bergtow.text import loads as loads_text
+
+#: what has been held against observations: case, what was observed, verdict; cases/validation/README.md has it in full
+EVIDENCE = (
+    ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, against what was "
+     "observed; above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
+    ("cover on a barrier", "the form and 1/friction hold; the length scale grows more slowly than the width in "
+     "channels of 5 to 15 floes"),
+    ("ship model in floes", "none: a prediction"))
+NO_FORCE = ("No measured mean force of a tow with complete conditions is public. No force of this report has been "
+            "compared with a measured one; the cases compare where and in which form ice jams with what was reported "
+            "of laboratories.")
+SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
+           ("d", "draft of the body, m"),
+           ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
+           ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
+           ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
+           ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
+STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO "
+             "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
+             "that one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
+             "chooses standard, factors and weather window.")
+#: keys of what limits an operation, with its name; the first that is known says what was simulated
+LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
+            ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
+            ("wind", ("air.wind_x", "air.wind_y")), ("current", ("water.current_x", "water.current_y")),
+            ("draft of the berg", ("body.draft", )))
+
+
+def lines(*some, faint=False):
+    return {"kind": "text", "lines": list(some), "warnings": [], "faint": faint}
+
+
+def table(head, rows):
+    return {"kind": "table", "head": head, "rows": rows}
+
+
+def load(c):
+    """The load of a condition that a limit is held against: the upper end of its interval, its design value, or the
+    largest simulated; None without any."""
+    d = c["design"]["tow"]
+    if d is None:
+        return None
+    high = d.get("interval_95", (np.nan, np.nan))[1]
+    return next((x for x in (high, d.get("value"), d["largest"]) if x is not None and np.isfinite(x)), None)
+
+
+def pull_of(cases, answer):
+    """(N, what it is) of the pull that limits are held against: the least that the vessel of the answer has at a speed
+    asked for, or the bollard pull of the case, of which less is left at speed; NaN where no vessel is named."""
+    at_speed = [x["has_n"] for x in (answer or {}).get("speeds", []) if x.get("has_n")]
+    if at_speed:
+        return float(min(at_speed)), "what the vessel pulls at the speed asked for"
+    return (max((case.bollard_pull for _, case in cases), default=np.nan),
+            "the bollard pull, of which less is left at speed")
+
+
+def held(s, pull, what):
+    """In words, which of the conditions a vessel holds by its pull."""
+    some = [(c["label"], load(c)) for c in s["conditions"] if load(c) is not None]
+    yes, no = ([name for name, n in some if (n <= pull) == holds] for holds in (True, False))
+    return "; ".join([f"{where} {quantity(pull, 'N')}, {what}: {loads_text.several(names)}"
+                      for where, names in (("within", yes), ("above", no)) if names])
+
+
+def operation(s, cases, values, answer):
+    """Blocks of the limits of operation."""
+    text = {v.key: in_short(v.value) for v in values}
+    (pull, what), rows = pull_of(cases, answer), []
+    head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
+    for name, keys in LIMITING:
+        said = " and ".join(text[k] for k in keys if k in text) or "–"
+        limit = "not looked for"
+        if keys[0] == "ice.concentration" and np.isfinite(pull):
+            limit = held(s, pull, what) or limit
+        elif keys[0] == "air.wind_x" and head_sea and head_sea["n"]:
+            air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))
+            limit = (f"at {air} m/s with {water} m/s of current from ahead the tow needs "
+                     f"{quantity(head_sea['n'], 'N')}")
+        elif keys[0] == "tow.speed" and answer and (most := (answer.get("feasible") or {}).get("not_above_m_s")):
+            limit = f"not above {number(most)} m/s with the vessel named"
+        rows.append([name, said, limit])
+    rule = ("Nothing is known outside of what was simulated. Where ice is denser, thicker or of larger floes, wind or "
+            "current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
+    if not np.isfinite(pull):
+        rule += " No vessel is named, so no limit follows from one: its net pull at the speed of the tow has to " \
+            "exceed the load of the condition."
+    return [lines(rule), table(["limit", "simulated", "what was found"], rows)]
+
+
+def _row(what, by_hand, n, simulated):
+    return [what, by_hand, quantity(n, "N"), quantity(simulated, "N") if np.isfinite(simulated) else "–",
+            number(simulated / n, 2) if n and np.isfinite(simulated) else "–"]
+
+
+def by_hand(run):
+    """Rows of a calculation by hand with the numbers of one run: drag of the water, momentum of the ice that the body
+    meets, and their sum."""
+    e = run.summary.get("estimates") or {}
+    width, speed = (e.get(k) if e.get(k) is not None else np.nan for k in ("width_m", "water_speed_m_s"))
+    draft, form, water = (run.value(k) for k in ("body.draft", "body.drag.water_form", "water.density"))
+    thick, concentration, ice = e.get("thickness_m", np.nan), e.get("concentration", np.nan), run.value("ice.density")
+    if not np.isfinite([width, speed, draft, form, water]).all():
+        return []
+    drag = 0.5 * water * form * width * draft * speed ** 2
+    out = [_row("drag of the water", f"½ ρw C W d V² = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
+                f"{number(width)} m × {number(draft)} m × ({number(speed)} m/s)²", drag,
+                run.number("mean_drag_force_n"))]
+    if np.isfinite([thick, concentration, ice]).all():
+        push = ice * thick * concentration * width * speed ** 2
+        out += [_row("ice brought to the speed of the body", f"ρi h A W V² = {number(ice, 4)} kg/m³ × "
+                     f"{number(thick)} m × {number(concentration)} × {number(width)} m × ({number(speed)} m/s)²", push,
+                     run.number("mean_ice_resistance_n")),
+                _row("both", "sum", drag + push, run.number("mean_tow_force_n"))]
+    return out
+
+
+def check(run, estimates):
+    """Blocks of the independent check. run: first field of the condition that governs, or None; estimates: rows of
+    reporting/run.py."""
+    if run is None:
+        return [lines("No member can be read.")]
+    out = [lines("By hand, with the numbers of the first field of the condition that governs. All ice in the way of "
+                 "the body is brought to its speed once: ice that is pushed aside asks for less, ice that hands "
+                 "the push on, rubs or rafts for more.")]
+    rows = by_hand(run)
+    out += [table(["what", "by hand", "force", "mean of the simulation", "simulated / by hand"], rows)] if rows else \
+        [lines("Nothing is towed at a known speed.")]
+    if estimates:
+        out += [{"kind": "heading", "text": "Published estimates"},
+                table(["estimate", "formula", "force", "simulated / estimate", "meant for these conditions"],
+                      [[r["label"], r["formula"], r["force"], r["ratio"],
+                        f"{'yes' if r['valid'] else 'no'}: {r['note']}"] for r in estimates])]
+    return out
+
+
+def evidence():
+    return [lines(NO_FORCE), table(["case", "verdict"], [list(row) for row in EVIDENCE]),
+            lines("Set-up, sources and numbers: cases/validation/README.md of the program.", faint=True)]
+
+
+def sources(values, estimates):
+    """Blocks of references, symbols and standards. values: of the case with their origin."""
+    found = {}
+    for v in values:
+        if v.kind == "source":
+            found.setdefault(v.origin.removeprefix("default: "), []).append(v.key)
+    for row in estimates:
+        found.setdefault(row["source"], []).append(f"estimate: {row['label']}")
+    def some(keys):
+        return ", ".join(keys[:4]) + (f" and {len(keys) - 4} more" if len(keys) > 4 else "")
+    return [{"kind": "heading", "text": "References"},
+            lines("As the case and the program name them.", faint=True),
+            table(["source", "what is from it"], [
+                ["Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138", "method"],
+                *([source, some(keys)] for source, keys in sorted(found.items()))]),
+            {"kind": "heading", "text": "Symbols"}, {"kind": "pairs", "label": "symbols", "rows": SYMBOLS},
+            {"kind": "heading", "text": "Standards"}, lines(STANDARDS)]
+
+
+def answer_beside(folder):
+    """answer.json of bergtow design; None where there is none."""
+    found = findings.read("answer", folder)
+    return found if isinstance(found, dict) and "sentence" in found else None

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""What the design report says beside its numbers: limits of operation, the check by hand, evidence, sources."""
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from harness import ROOT, TOW, changed, run
+
+from bergtow.reporting import document
+from bergtow.reporting import run as report_run
+from bergtow.result import origins
+from bergtow.result.run import Run
+
+UNKNOWN = SimpleNamespace(bollard_pull=np.nan)
+
+
+def condition(label, **tow):
+    return {"label": label, "design": {"tow": tow}}
+
+
+def value(key, text, kind="given", origin=""):
+    return origins.Value(key, text, "", kind, origin)
+
+
+CONDITIONS = {"conditions": [condition("50 %", value=4e5, interval_95=(3e5, 5e5), largest=3.9e5),
+                             condition("70 %", value=7e5, interval_95=(6e5, 9e5), largest=6e5),
+                             condition("90 %", largest=2e6)]}
+VALUES = [value("ice.concentration", "varied, 50 to 90 %"), value("air.wind_x", "-10 m/s"),
+          value("air.wind_y", "0 m/s")]
+
+
+def rows(cases, answer=None):
+    text, table = document.operation(CONDITIONS, cases, VALUES, answer)
+    return " ".join(text["lines"]), {row[0]: row[1:] for row in table["rows"]}
+
+
+@pytest.mark.parametrize("load, expected", [
+    ({"value": 4e5, "interval_95": (3e5, 5e5), "largest": 3e5}, 5e5),
+    ({"value": 4e5, "interval_95": (3e5, np.inf), "largest": 3e5}, 4e5), ({"largest": 3e5}, 3e5)])
+def test_the_load_that_a_limit_is_held_against(load, expected):
+    """The upper end, where there is one."""
+    assert document.load(condition("a", **load)) == expected
+
+
+def test_without_a_vessel_no_limit_is_made_up():
+    rule, found = rows([(None, UNKNOWN)])
+    assert "No vessel is named" in rule
+    assert {limit for _, limit in found.values()} == {"not looked for"}
+    assert found["concentration of the ice"][0] == "varied, 50 to 90 %" and found["wind"][0] == "-10 m/s and 0 m/s"
+    assert found["thickness of the ice"][0] == "–"
+
+
+def test_the_vessel_draws_the_limit_by_the_upper_ends():
+    """70 % has a value below the pull and an upper end above it."""
+    said = "within 800 kN, {0}: 50 %; above 800 kN, {0}: 70 %; 90 %"
+    assert rows([(None, SimpleNamespace(bollard_pull=8e5))])[1]["concentration of the ice"][1] == said.format(
+        "the bollard pull, of which less is left at speed")
+    answer = {"speeds": [{"has_n": 9.5e5}, {"has_n": 8e5}, {"has_n": None}], "feasible": {"not_above_m_s": 0.6},
+              "load_cases": [{"id": "case.head_sea", "n": 7.5e5, "values": {"wind_m_s": 15.0, "current_m_s": 0.25}}]}
+    rule, found = rows([(None, UNKNOWN)], answer)
+    assert found["concentration of the ice"][1] == said.format("what the vessel pulls at the speed asked for")
+    assert "No vessel is named" not in rule
+    assert found["speed of the tow"][1].startswith("not above 0.600 m/s")
+    assert re.search(r"15\.0 m/s with 0\.250 m/s of current.* 750 kN", found["wind"][1])
+    answer["load_cases"][0]["n"] = None
+    assert rows([], answer)[1]["wind"][1] == "not looked for"
+
+
+def test_the_check_by_hand_is_that_of_the_numbers_it_names(tmp_path):
+    """Each formula, with its numbers as they stand there, gives the force beside it; open water is the simulation's."""
+    r = run(tmp_path, changed(TOW, output=None, run__duration=20, output__window_start=10, ice__concentration=0.3))
+    with Run(r.dir) as opened:
+        found, estimates = document.by_hand(opened), report_run.estimates(opened)
+        drag, ice, both = found
+        blocks = document.check(opened, estimates)
+    for what, words, force, simulated, ratio in (drag, ice):
+        product = eval(re.sub(r" (kg/m³|m/s|m)", "", words.partition(" = ")[2]).replace("½", "0.5").replace(
+            "×", "*").replace("²", "**2"))
+        n, unit = force.split()
+        assert product == pytest.approx(float(n) * {"N": 1, "kN": 1e3}[unit], rel=0.01), words
+        assert float(ratio) == pytest.approx(float(simulated.split()[0]) / float(n), rel=0.06)
+    assert 0.97 < float(drag[4]) < 1.03  # skin and air beside it
+    n = [float(row[2].split()[0]) for row in found]
+    assert n[0] + n[1] == pytest.approx(n[2], rel=0.01)
+    assert [row[0] for row in blocks[-1]["rows"]] == [e["label"] for e in estimates]
+
+
+def test_the_evidence_is_what_the_validation_says():
+    """One wording: a verdict that changes there changes here."""
+    text = (ROOT / "cases/validation/README.md").read_text(encoding="utf-8")
+    table = dict(re.findall(r"^\| \[([^\]]+)\]\([^)]*\) \| (.+) \|$", text, re.M))
+    assert {name.split(" in plastic")[0].replace(" in floes", ""): verdict for name, verdict in table.items()} == {
+        name.replace(" in floes", ""): verdict for name, verdict in document.EVIDENCE}
+
+
+def test_each_source_stands_once_with_what_is_from_it():
+    some = [value(f"a.k{k}", "1", "source", "default: Smith 1999") for k in range(6)] + [
+        value("a.x", "1", "assumed", "assumed"), value("a.y", "1", "source", "Jones 2001")]
+    blocks = document.sources(some, [{"source": "Jones 2001", "label": "ramming"}])
+    table = dict(next(b for b in blocks if b["kind"] == "table")["rows"][1:])
+    assert table == {"Smith 1999": "a.k0, a.k1, a.k2, a.k3 and 2 more", "Jones 2001": "a.y, estimate: ramming"}
