@@ -90,6 +90,7 @@ _SIGNATURES = {
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
     "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
+    "bt_outline_unproject": (None, c_double, c_double, c_double, c_double, POINTER(c_double), POINTER(c_double)),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),
