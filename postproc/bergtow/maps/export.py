@@ -59,7 +59,7 @@ class Place:
         a = run.map_axes
         swapped = run.geographic
         if "crs" not in a:
-            return Place(swapped, "", (0.0, 0.0))
+            return Place(swapped, "", tuple(run.number(f"outlines.origin_{a}_m", 0.0) for a in ("east", "north")))
         degrees = dict(re.findall(r"\+(lon_0|lat_0)=(\S+)", a["crs"]))
         if degrees:
             return Place(swapped, map_plane.WGS84, (float(degrees["lon_0"]), float(degrees["lat_0"])))
@@ -133,9 +133,21 @@ class Layer:
     places: list    #: [n] of [k, 2] m, in the frame of the case
 
 
+def _iceberg(run, frame):
+    """Where the iceberg is [2] m: frames have it in the domain, the series not wrapped."""
+    time = run.frame_times[frame]
+    way = [np.interp(time, run["time"], run[name]) for name in ("body_x", "body_y")]
+    return run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2], way)[0]
+
+
 def _about(run, frame):
-    """The iceberg where it is: in a periodic domain the ice around it is exported."""
-    return None if run.towed is None else run.body_pose(frame)[run.towed, :2]
+    """The middle of the ice that is exported of a periodic domain: that of a moving window, which has its end a fixed
+    distance ahead of the iceberg; otherwise the iceberg. None without one."""
+    if run.towed is None:
+        return None
+    ahead = run.number("moving_window.ahead_m", run.period[0] / 2)
+    sign = np.sign(run.headings[0, 0]) or 1.0
+    return _iceberg(run, frame) + np.array([sign * (ahead - run.period[0] / 2), 0.0])
 
 
 def floes_layer(run, frames):
@@ -161,7 +173,8 @@ def floes_layer(run, frames):
 def bodies_layer(run, frames):
     """The iceberg and fixed bodies; walls are limits of the computation, and none of the map."""
     rows = [(body, frame, ring) for frame in frames
-            for body, ring in zip(run.bodies, run.body_polygons(frame, _about(run, frame))) if not body.wall]
+            for body, ring in zip(run.bodies, run.body_polygons(frame, None if run.towed is None else
+                                                                _iceberg(run, frame))) if not body.wall]
     return Layer("bodies", "Polygon", {
         "name": ("", ["iceberg" if body.towed else body.name for body, _, _ in rows]),
         "time_s": ("s", np.array([run.frame_times[frame] for _, frame, _ in rows]))}, [ring for _, _, ring in rows])
@@ -211,7 +224,7 @@ class Trajectories:
     @staticmethod
     def of(run, frames):
         time = run.frame_times[frames]
-        xy = np.stack([run.pose(f)[:, :2] for f in frames], axis=1)
+        xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
         speed = np.stack([run.speed(f) for f in frames], axis=1)
         piece = _pieces(xy, np.array(run.period))
         out = Trajectories([], time, [], [], [])
@@ -224,7 +237,7 @@ class Trajectories:
         for name, x, y in TRACKS:
             if x in run and np.isfinite(run[x]).any():
                 if name == "iceberg":
-                    way = np.array([run.body_pose(f)[run.towed, :2] for f in frames])
+                    way = np.array([_iceberg(run, f) for f in frames])
                 else:  # frames lie between samples, and the first before all of them
                     way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
                 speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
@@ -241,8 +254,8 @@ class Trajectories:
 
 
 def _pieces(xy, period):
-    """[n, T] which piece of ice a floe is at each time: a moving window puts one that is left behind to the front, by
-    the period, where it is other ice."""
+    """[n, T] which piece of ice a floe is at each time: in a periodic domain one that is left behind comes again ahead,
+    a period on, as other ice."""
     jumps = (np.abs(np.diff(xy, axis=1)) > np.where(period > 0, period / 2, np.inf)).any(axis=2)
     return np.concatenate([np.zeros((len(xy), 1), int), np.cumsum(jumps, axis=1)], axis=1)
 
@@ -474,8 +487,11 @@ def perform(a):
             if not layers:
                 raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
             _write(layers, place, path, kind, a.force)
-            times = f"t = {run.frame_times[frames[0]]:.6g} s" if len(frames) == 1 else f"{len(frames)} times"
-            print(f"{path}: {', '.join(f'{len(layer.places)} {layer.name}' for layer in layers)}; {times}")
+            print(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
+            if any(layer.name in ("floes", "bodies") for layer in layers):
+                at = run.frame_times[frames]
+                print(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
+                      f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")
         print(f"coordinates: {place.words}")
 
 
