@@ -99,6 +99,7 @@ _SIGNATURES = {
     "bt_catenary_span": (c_double, c_double, c_double, c_double, c_double),
     "bt_catenary_pull": (c_double, c_double, c_double, c_double, c_double, POINTER(c_double)),
     "bt_estimate_ship": (Estimate, c_double, c_double, c_double, c_double, c_double),
+    "bt_outline_unproject": (None, c_double, c_double, c_double, c_double, POINTER(c_double), POINTER(c_double)),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),

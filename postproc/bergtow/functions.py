@@ -225,6 +225,14 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
         return Outlines(Path(map), Path(file), json.loads(record.read_text(encoding="utf-8")), text, words)
 
 
+def export(run: Of, file: str | os.PathLike[str], *, replace: bool = False, **options: Any) -> Path:
+    """Write floes, tracks and loads of a run for the map, and return the file's path. run: a folder or Result. file:
+    .gpkg, .geojson or .shp, which need GDAL but for .geojson, or trajectories as .csv or .nc. options: those of
+    `bergtow export`, as time=600, layer="tracks", start="2027-03-01"."""
+    _call("export", _folder(run), "-o", file, *(["--force"] if replace else []), *_words(options))
+    return Path(file)
+
+
 def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[str],
            options: Mapping[str, Any]) -> dict[str, Any]:
     _perform(command, file, "-o", out, *_words(options))

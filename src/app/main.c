@@ -46,6 +46,8 @@ static const struct {
      bt_cmd_python, false, false},
     {"statistics", "statistics of an ensemble: design force, loads, intervals, in tables and files",
      bt_cmd_python, false, false},
+    {"export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, trajectories",
+     bt_cmd_python, false, false},
     {"contents", "list what the folder of a run holds", bt_cmd_python, false, false},
     {"film", "make a film of a run", bt_cmd_python, false, false},
     {"plot-force", "draw the forces of a run against time", bt_cmd_python, false, false},

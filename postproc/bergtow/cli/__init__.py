@@ -25,6 +25,8 @@ COMMANDS = {
                "computation"),
     "capability": ("study.capability", "find out how fast a vessel tows in which ice, and the ice that stops it"),
     "outlines": ("maps.outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines"),
+    "export": ("maps.export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, "
+               "trajectories"),
     "contents": ("result.contents", "list what the folder of a run holds"),
     "film": ("plot.film", "make a film of a run"),
     "plot-force": ("plot.force", "draw the forces of a run against time"),

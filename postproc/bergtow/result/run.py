@@ -457,6 +457,15 @@ class Run:
         return self.case.get("domain.frame") == "geographic"
 
     @property
+    def map_axes(self):
+        """Where the frame lies on the map, attributes of /xdmf: "origin_x", "origin_y" m, and where that place is known
+        on the earth "crs", for PROJ, and its coordinates there, "origin_east", "origin_north" m."""
+        node = self._file.get("xdmf")
+        if node is None:
+            raise RunError(self.result, "has no /xdmf", "the file is incomplete: run the case again")
+        return {name: plain(value) for name, value in node.attrs.items()}
+
+    @property
     def box(self):
         """(x0, x1, y0, y1) m of the domain; from the floes of the first frame when the case does not say."""
         def find():
@@ -666,6 +675,10 @@ class Run:
     def speed(self, frame):
         """[N] m/s, speed of each floe."""
         return self._of_floes("speed", frame, len(self.bodies))
+
+    def body_speed(self, frame):
+        """[B] m/s, speed of each body."""
+        return self._frame("speed", frame, self.n_floes + len(self.bodies))[self.n_floes:]
 
     def wrap(self, xy, centre=None):
         """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).

@@ -1,0 +1,526 @@
+# SPDX-License-Identifier: MIT
+"""From the folder of a run back to the map: floes at a time, tracks of iceberg, towing end and vessel, loads.
+
+    bergtow export RUN -o after.gpkg                     floes, bodies, tracks and loads, a layer each
+    bergtow export RUN -o after.geojson --time 600       one layer; the floes are outlines for ice.outlines
+    bergtow export RUN -o drift.nc                       trajectories of everything in the frames, CF-1.8
+
+Coordinates are those of the map that the ice came from: degrees on WGS 84 or metres of its projection; metres of no
+place on the earth where the case names none. Degrees follow from the plane of the case by the projection of the
+library, by which it reads them (bergtow/outline.h), so a file comes back to where it was.
+
+Formats: GeoJSON by hand, as RFC 7946 has it, but for a crs of metres, which it leaves to those who agree on one; an
+outline over the 180th meridian is not cut there. GeoPackage and shapefile by GDAL, as maps are read. Trajectories: the
+discrete sampling geometry of CF-1.8, in the classic format of NetCDF, all with the times of the frames.
+"""
+import argparse
+import csv
+import ctypes
+import datetime
+import json
+import math
+import re
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from bergtow import _library, arguments, writing
+from bergtow.errors import IO, USAGE, BergtowError, RunError
+from bergtow.maps import plane as map_plane
+from bergtow.maps import read as map_read
+from bergtow.result.run import Run
+
+import numpy as np
+
+LAYERS = ("floes", "bodies", "tracks", "loads")
+#: layers that a file gets where --layer names none
+DEFAULT = {".gpkg": LAYERS, ".geojson": ("floes",), ".json": ("floes",), ".shp": ("floes",), ".csv": (), ".nc": ()}
+TRAJECTORIES = (".csv", ".nc")
+#: positions in the series: (name of the track, its x, its y)
+TRACKS = (("iceberg", "body_x", "body_y"), ("towing end", "carriage_x", "carriage_y"),
+          ("vessel", "vessel_x", "vessel_y"))
+
+
+# ---- where the case lies
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where x = y = 0 of a run lies, and how."""
+
+    geographic: bool     #: x is north and y east; else x is the first axis and y the second
+    crs: str             #: for PROJ: OGC:CRS84 for degrees, "EPSG:32633"; "" for no place on the earth
+    zero: tuple          #: coordinates of x = y = 0 in it: longitude and latitude, or m
+
+    @staticmethod
+    def of(run):
+        """Errors: RunError."""
+        a = run.map_axes
+        swapped = run.geographic
+        if "crs" not in a:
+            return Place(swapped, "", tuple(run.number(f"outlines.origin_{a}_m", 0.0) for a in ("east", "north")))
+        degrees = dict(re.findall(r"\+(lon_0|lat_0)=(\S+)", a["crs"]))
+        if degrees:
+            return Place(swapped, map_plane.WGS84, (float(degrees["lon_0"]), float(degrees["lat_0"])))
+        origin = (a["origin_y"], a["origin_x"]) if swapped else (a["origin_x"], a["origin_y"])
+        return Place(swapped, a["crs"], (a["origin_east"] - origin[0], a["origin_north"] - origin[1]))
+
+    @property
+    def degrees(self):
+        return self.crs == map_plane.WGS84
+
+    @property
+    def frame(self):
+        return "geographic" if self.geographic else "basin"
+
+    def metres(self, xy):
+        """East and north [..., 2] of places in the frame of the case, from x = y = 0."""
+        return xy[..., ::-1] if self.geographic else xy
+
+    def coordinates(self, xy):
+        """Coordinates [..., 2] on the map: longitude and latitude, or east and north."""
+        east_north = self.metres(np.asarray(xy, float))
+        return _degrees(east_north, self.zero) if self.degrees else east_north + self.zero
+
+    def ring(self, outline):
+        """A closed ring, anticlockwise on the map, of an outline that is so in x and y."""
+        ring = self.coordinates(outline)[::-1 if self.geographic else 1]
+        return np.concatenate([ring, ring[:1]])
+
+    def lonlat(self, xy):
+        """Longitude and latitude [..., 2], or None of no place on the earth. Errors: ModuleNotFoundError."""
+        at = self.coordinates(xy)
+        if self.degrees or not self.crs:
+            return at if self.degrees else None
+        import pyproj
+        to = pyproj.Transformer.from_crs(self.crs, map_plane.WGS84, always_xy=True)
+        lon, lat = to.transform(at[..., 0], at[..., 1])
+        return np.where(np.isfinite(at), np.stack([lon, lat], axis=-1), np.nan)
+
+    @property
+    def words(self):
+        if self.degrees:
+            return "longitude and latitude, degrees on WGS 84"
+        if self.crs:
+            return f"{self.crs}, metres east and north"
+        return f"metres of no place on the earth, {'east and north' if self.geographic else 'x and y of the basin'}"
+
+
+def _degrees(east_north, zero):
+    """Longitude and latitude of metres about a place, by the library; NaN stays."""
+    unproject = _library.library().bt_outline_unproject
+    lon0, lat0 = map(math.radians, zero)
+    lon, lat = ctypes.c_double(), ctypes.c_double()
+    out = np.full(east_north.shape, np.nan)
+    flat, to = east_north.reshape(-1, 2), out.reshape(-1, 2)
+    for k in np.flatnonzero(np.isfinite(flat).all(axis=1)):
+        unproject(flat[k, 1], flat[k, 0], lon0, lat0, lon, lat)
+        to[k] = lon.value, lat.value
+    return np.degrees(out)
+
+
+# ---- what is exported
+
+
+@dataclass
+class Layer:
+    """Features of one kind."""
+
+    name: str
+    geometry: str   #: "Polygon", "LineString" or "Point"
+    columns: dict   #: {name: (unit or "", values [n])}
+    places: list    #: [n] of [k, 2] m, in the frame of the case
+
+
+def _iceberg(run, frame):
+    """Where the iceberg is [2] m: frames have it in the domain, the series not wrapped."""
+    time = run.frame_times[frame]
+    way = [np.interp(time, run["time"], run[name]) for name in ("body_x", "body_y")]
+    return run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2], way)[0]
+
+
+def _about(run, frame):
+    """The middle of the ice that is exported of a periodic domain: that of a moving window, which has its end a fixed
+    distance ahead of the iceberg; otherwise the iceberg. None without one."""
+    if run.towed is None:
+        return None
+    ahead = run.number("moving_window.ahead_m", run.period[0] / 2)
+    sign = np.sign(run.headings[0, 0]) or 1.0
+    return _iceberg(run, frame) + np.array([sign * (ahead - run.period[0] / 2), 0.0])
+
+
+def floes_layer(run, frames):
+    """The floes that are there at the frames."""
+    places, index, at = [], [], []
+    for frame in frames:
+        there = np.flatnonzero(np.isfinite(run.pose(frame)).all(axis=1))
+        rings = run.polygons(frame, _about(run, frame))
+        places += [rings[i] for i in there]
+        index.append(there)
+        at.append(np.full(len(there), frame))
+    index, at = np.concatenate(index), np.concatenate(at)
+
+    def of(values):
+        return np.concatenate([values(f)[index[at == f]] for f in frames])
+
+    return Layer("floes", "Polygon", {
+        "id": ("", index), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
+        "area_m2": ("m2", run.area[index]), "speed_m_s": ("m/s", of(run.speed)),
+        "force_n": ("N, largest normal contact force in the step", of(run.contact_force))}, places)
+
+
+def bodies_layer(run, frames):
+    """The iceberg and fixed bodies; walls are limits of the computation, and none of the map."""
+    rows = [(body, frame, ring) for frame in frames
+            for body, ring in zip(run.bodies, run.body_polygons(frame, None if run.towed is None else
+                                                                _iceberg(run, frame))) if not body.wall]
+    return Layer("bodies", "Polygon", {
+        "name": ("", ["iceberg" if body.towed else body.name for body, _, _ in rows]),
+        "time_s": ("s", np.array([run.frame_times[frame] for _, frame, _ in rows]))}, [ring for _, _, ring in rows])
+
+
+def tracks_layer(run, _):
+    """Ways of the iceberg, the towing end and the vessel over the whole run."""
+    names, places, columns = [], [], []
+    for name, x, y in TRACKS:
+        if x not in run:
+            continue
+        xy = np.column_stack([run[x], run[y]])
+        there = np.isfinite(xy).all(axis=1)
+        if there.sum() > 1:
+            names.append(name)
+            places.append(xy[there])
+            time = run["time"][there]
+            columns.append((time[0], time[-1], np.hypot(*np.diff(xy[there], axis=0).T).sum()))
+    start, end, length = np.array(columns).reshape(-1, 3).T
+    return Layer("tracks", "LineString", {"name": ("", names), "start_s": ("s", start), "end_s": ("s", end),
+                                          "length_m": ("m", length)}, places)
+
+
+def loads_layer(run, _):
+    """Forces and loads of each sample, at the place of the iceberg."""
+    if "body_x" not in run:
+        return Layer("loads", "Point", {}, [])
+    xy = np.column_stack([run["body_x"], run["body_y"]])
+    names = [name for name in run.by_role("balance", "force", "load") if np.isfinite(run[name]).any()]
+    return Layer("loads", "Point", {"time_s": ("s", run["time"])} |
+                 {name: (run.units(name), run[name]) for name in names}, list(xy[:, None, :]))
+
+
+MAKE = {"floes": floes_layer, "bodies": bodies_layer, "tracks": tracks_layer, "loads": loads_layer}
+
+
+@dataclass
+class Trajectories:
+    """Places of everything in the frames, [n, T]; NaN where it is not there."""
+
+    name: list            #: [n]: "floe 17", "iceberg", "towing end", "vessel"
+    time: np.ndarray      #: [T] s
+    xy: np.ndarray        #: [n, T, 2] m, in the frame of the case
+    speed: np.ndarray     #: [n, T] m/s
+    thickness: np.ndarray  #: [n] m, NaN but for floes
+
+    @staticmethod
+    def of(run, frames):
+        time = run.frame_times[frames]
+        xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
+        speed = np.stack([run.speed(f) for f in frames], axis=1)
+        piece = _pieces(xy, np.array(run.period))
+        out = Trajectories([], time, [], [], [])
+        for i in range(run.n_floes):
+            for k in range(piece[i].max() + 1):
+                at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
+                if at.any():
+                    out._add(f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
+                             np.where(at, speed[i], np.nan), run.thickness[i])
+        for name, x, y in TRACKS:
+            if x in run and np.isfinite(run[x]).any():
+                if name == "iceberg":
+                    way = np.array([_iceberg(run, f) for f in frames])
+                else:  # frames lie between samples, and the first before all of them
+                    way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
+                speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
+                out._add(name, way, np.array(speeds), np.nan)
+        if not out.name:
+            raise RunError(run.result, "holds nothing that moves", "export a run with floes or a towed body")
+        return Trajectories(out.name, time, *(np.array(v) for v in (out.xy, out.speed, out.thickness)))
+
+    def _add(self, name, xy, speed, thickness):
+        self.name.append(name)
+        self.xy.append(xy)
+        self.speed.append(speed)
+        self.thickness.append(thickness)
+
+
+def _pieces(xy, period):
+    """[n, T] which piece of ice a floe is at each time: in a periodic domain one that is left behind comes again ahead,
+    a period on, as other ice."""
+    jumps = (np.abs(np.diff(xy, axis=1)) > np.where(period > 0, period / 2, np.inf)).any(axis=2)
+    return np.concatenate([np.zeros((len(xy), 1), int), np.cumsum(jumps, axis=1)], axis=1)
+
+
+# ---- files
+
+
+def _value(v):
+    v = v.item() if isinstance(v, np.generic) else v
+    return None if isinstance(v, float) and not math.isfinite(v) else v
+
+
+def _rows(layer):
+    """(properties, place) of each feature."""
+    names, values = list(layer.columns), [v for _, v in layer.columns.values()]
+    for k, place in enumerate(layer.places):
+        yield {name: _value(v[k]) for name, v in zip(names, values)}, place
+
+
+def geojson(layer, place):
+    """The text. Its head is that of `bergtow outlines` and `bergtow field`, so ice.outlines knows frame and origin."""
+    head = {"type": "FeatureCollection", "made_by": writing.MARK,
+            "bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
+    if not place.degrees:
+        head["crs"] = {"type": "name", "properties": {"name": place.crs or map_read.local_crs()}}
+    lines = []
+    for properties, at in _rows(layer):
+        where = (place.coordinates(at[0]).tolist() if layer.geometry == "Point" else
+                 [place.ring(at).tolist()] if layer.geometry == "Polygon" else place.coordinates(at).tolist())
+        lines.append(json.dumps({"type": "Feature", "properties": properties, "geometry": {
+            "type": layer.geometry, "coordinates": where}}, allow_nan=False))
+    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+
+
+def write_ogr(layers, place, path, driver):
+    """Layers by GDAL, in a file that is not there yet. Names that it has changed, {ours: its own}."""
+    from osgeo import gdal, ogr, osr
+    ogr.UseExceptions()
+    osr.UseExceptions()
+    reference = osr.SpatialReference()
+    if place.crs:
+        reference.SetFromUserInput("EPSG:4326" if place.degrees else place.crs)
+        reference.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
+    else:
+        reference.SetLocalCS("Undefined Cartesian SRS")
+    file = ogr.GetDriverByName(driver).CreateDataSource(str(path))
+    renamed = {}
+    for layer in layers:
+        kind = {"Polygon": ogr.wkbPolygon, "LineString": ogr.wkbLineString, "Point": ogr.wkbPoint}[layer.geometry]
+        there = file.CreateLayer(layer.name, reference, kind, [f"DESCRIPTION={layer.name} of a run; {writing.MARK}"]
+                                 if driver == "GPKG" else ["ENCODING=UTF-8"])
+        columns = layer.columns if driver == "GPKG" else layer.columns | {"made_by": ("", [])}
+        for name, (unit, values) in columns.items():
+            number = np.asarray(values).dtype.kind
+            field = ogr.FieldDefn(name, {"i": ogr.OFTInteger64, "f": ogr.OFTReal}.get(number if unit or len(values)
+                                                                                       else "U", ogr.OFTString))
+            if driver == "GPKG" and unit:
+                field.SetAlternativeName(f"{name} ({unit})")
+            map_read.quietly(there.CreateField, field)
+        schema = there.GetLayerDefn()
+        given = [schema.GetFieldDefn(k).GetName() for k in range(schema.GetFieldCount())]
+        renamed |= {ours: theirs for ours, theirs in zip(columns, given) if ours != theirs}
+        there.StartTransaction()
+        for properties, at in _rows(layer):
+            feature = ogr.Feature(schema)
+            if driver != "GPKG":
+                properties["made_by"] = writing.MARK
+            for k, value in enumerate(properties.values()):
+                if value is not None:
+                    feature.SetField(k, value)
+            feature.SetGeometryDirectly(_geometry(ogr, layer.geometry, kind, place, at))
+            there.CreateFeature(feature)
+        there.CommitTransaction()
+    there = file = None  # which closes it
+    return renamed
+
+
+def _geometry(ogr, name, kind, place, at):
+    points = place.ring(at) if name == "Polygon" else place.coordinates(at)
+    if place.degrees:  # whole over the 180th meridian
+        points = np.column_stack([np.unwrap(points[:, 0], period=360), points[:, 1]])
+    line = ogr.Geometry(ogr.wkbLinearRing if name == "Polygon" else kind)
+    for x, y in points:
+        line.AddPoint_2D(x, y)
+    if name != "Polygon":
+        return line
+    polygon = ogr.Geometry(kind)
+    polygon.AddGeometry(line)
+    return polygon
+
+
+def write_shapefile(layer, place, path, force):
+    """The files of a shapefile, the one with its name last. The mark is in its table."""
+    with tempfile.TemporaryDirectory() as there:
+        new = Path(there) / path.name
+        renamed = write_ogr([layer], place, new, "ESRI Shapefile")
+        for part in sorted(Path(there).iterdir(), key=lambda p: p.suffix == path.suffix):
+            with writing.written(path.with_suffix(part.suffix), True) as whole:
+                shutil.copyfile(part, whole)
+    return renamed
+
+
+def trajectory_columns(place):
+    """Names of the two coordinates in a table."""
+    return ("longitude", "latitude") if place.degrees else ("east_m", "north_m") if place.crs or place.geographic else (
+        "x_m", "y_m")
+
+
+def write_table(t, place, path, force):
+    at = place.coordinates(t.xy)
+    with writing.written(path, force) as new, open(new, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(["name", "time_s", *trajectory_columns(place), "speed_m_s", "thickness_m", "made_by"])
+        mark = writing.MARK  # once: a table of all floes has millions of rows
+        for i, name in enumerate(t.name):
+            for k in np.flatnonzero(np.isfinite(at[i]).all(axis=1)):
+                row = [_value(v) for v in (t.time[k], *at[i, k], t.speed[i, k], t.thickness[i])]
+                table.writerow([name, *("" if v is None else repr(v) for v in row), mark])
+                mark = ""
+
+
+def dataset(t, place, start, title):
+    """Trajectories as xarray.Dataset: CF-1.8, section 9 and appendix H.4, multidimensional arrays."""
+    import xarray
+    both = ("trajectory", "time")
+    named = start or datetime.datetime(1970, 1, 1)
+    time = {"standard_name": "time", "long_name": "time", "axis": "T", "calendar": "standard",
+            "units": f"seconds since {named:%Y-%m-%d %H:%M:%S}"}
+    if start is None:
+        time["comment"] = "assumed: the case names no date, and time zero is that of the run"
+    lonlat, at = place.lonlat(t.xy), place.coordinates(t.xy)
+    coordinates = {}
+    if lonlat is not None:
+        coordinates = {name: (both, lonlat[..., k], {"standard_name": words, "long_name": words, "units": units})
+                       for k, (name, words, units) in enumerate((("lon", "longitude", "degrees_east"),
+                                                                 ("lat", "latitude", "degrees_north")))}
+    variables = {
+        "speed": (both, t.speed, {"long_name": "speed of the centroid", "units": "m s-1"}),
+        "thickness": ("trajectory", t.thickness, {"long_name": "thickness of the floe", "units": "m",
+                                                  "standard_name": "sea_ice_thickness"})}
+    if not place.degrees:
+        projected = [{"standard_name": f"projection_{a}_coordinate"} if place.crs else {} for a in "xy"]
+        coordinates |= {a: (both, at[..., k], {"long_name": words, "units": "m"} | projected[k])
+                        for k, (a, words) in enumerate(zip("xy", ("easting", "northing") if place.crs
+                                                           or place.geographic else ("x of the basin",
+                                                                                     "y of the basin")))}
+    if place.crs and not place.degrees:
+        import pyproj
+        variables["crs"] = ((), 0, pyproj.CRS(place.crs).to_cf())
+        for name in ("speed",):
+            variables[name][2]["grid_mapping"] = "crs"
+    names = np.array(t.name, dtype="S")
+    return xarray.Dataset(
+        variables | {"trajectory_name": ("trajectory", names, {"cf_role": "trajectory_id",
+                                                               "long_name": "name of the body or floe"})},
+        coordinates | {"time": ("time", t.time, time)},
+        {"Conventions": "CF-1.8", "featureType": "trajectory", "title": title,
+         "source": "bergtow, discrete element model", "made_by": writing.MARK, "comment": place.words})
+
+
+def write_netcdf(t, place, path, force, start, title):
+    data = dataset(t, place, start, title)
+    with writing.written(path, force) as new:
+        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT",
+                       encoding={"time": {"_FillValue": None}})
+
+
+# ---- the command
+
+
+def moment(text):
+    """--time: "all", "last" or a time, s."""
+    if text in ("all", "last"):
+        return text
+    return arguments.finite(text.removesuffix("s").strip())
+
+
+def date(text):
+    try:
+        at = datetime.datetime.fromisoformat(text.removesuffix("Z"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: is no date; write for example 2027-03-01T06:00") from None
+    if at.tzinfo is not None:
+        at = at.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+    return at
+
+
+def options(p):
+    p.add_argument("run", metavar="RUN", help="output folder of a run")
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="file to write: .gpkg, .geojson, "
+                   ".shp, or trajectories of everything as .csv or .nc (CF-1.8)")
+    p.add_argument("--time", metavar="T", type=moment, help="floes and bodies at the frame next to T seconds, at the "
+                   "last one, or at all (default: last; all for trajectories)")
+    p.add_argument("--layer", choices=LAYERS, help="that alone (default: all in a .gpkg, floes in a .geojson or .shp)")
+    p.add_argument("--start", metavar="DATE", type=date, help="UTC at time zero, for a .nc: 2027-03-01T06:00 "
+                   "(default: 1970, marked as assumed)")
+    arguments.add_force(p)
+
+
+def perform(a):
+    path, kind = a.output, a.output.suffix.lower()
+    arguments.ends_in(path, tuple(DEFAULT))
+    trajectories = kind in TRAJECTORIES
+    if a.layer and trajectories:
+        raise BergtowError(f"--layer: {kind} holds trajectories; leave it out, or write a .gpkg, .geojson or .shp",
+                           USAGE)
+    if a.start and kind != ".nc":
+        raise BergtowError(f"--start: {kind} holds no dates; leave it out, or write a .nc", USAGE)
+    for file in (path, *([path.with_suffix(".dbf")] if kind == ".shp" else ())):
+        if not (kind == ".shp" and file == path and path.with_suffix(".dbf").exists()):
+            writing.may_write(file, a.force)
+    if kind in (".gpkg", ".shp"):
+        map_read.need_libraries()
+    with Run(a.run) as run:
+        place = Place.of(run)
+        frames = frames_of(run, a.time or ("all" if trajectories else "last"))
+        if trajectories:
+            t = Trajectories.of(run, frames)
+            if kind == ".csv":
+                write_table(t, place, path, a.force)
+            else:
+                write_netcdf(t, place, path, a.force, a.start, run.attributes.get("title", "") or "tow through ice")
+            print(f"{path}: {len(t.name)} trajectories, {len(t.time)} times")
+            if kind == ".nc" and not a.start:
+                print("time: seconds since 1970, assumed: the case names no date; say it with --start")
+        else:
+            layers = [MAKE[name](run, frames) for name in ([a.layer] if a.layer else DEFAULT[kind])]
+            layers = [layer for layer in layers if layer.places]
+            if not layers:
+                raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
+            _write(layers, place, path, kind, a.force)
+            print(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
+            if any(layer.name in ("floes", "bodies") for layer in layers):
+                at = run.frame_times[frames]
+                print(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
+                      f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")
+        print(f"coordinates: {place.words}")
+
+
+def frames_of(run, time):
+    """Indices of frames. Errors: RunError, BergtowError for a time beyond them."""
+    last = run.frame_at(math.inf if time == "last" else 0.0 if time == "all" else time)
+    if time == "all":
+        return list(range(run.n_frames))
+    if time == "last":
+        return [run.n_frames - 1]
+    if not run.frame_times[0] <= time <= run.frame_times[-1]:
+        raise BergtowError(f"--time: {time:g} s is outside the frames, {run.frame_times[0]:g} to "
+                           f"{run.frame_times[-1]:g} s", USAGE)
+    return [last]
+
+
+def _write(layers, place, path, kind, force):
+    renamed = {}
+    try:
+        if kind == ".shp":
+            renamed = write_shapefile(layers[0], place, path, force)
+        elif kind == ".gpkg":
+            with writing.written(path, force) as new:
+                renamed = write_ogr(layers, place, new, "GPKG")
+        else:
+            writing.write_text(geojson(layers[0], place), path, force)
+    except RuntimeError as error:
+        raise RunError(path, f"cannot be written ({map_read.first_line(error)})", "choose another place with -o",
+                       IO) from None
+    if renamed:
+        print("columns: names of a shapefile have ten characters: "
+              + ", ".join(f"{ours} is {theirs}" for ours, theirs in renamed.items()))

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: MIT
+"""bergtow export: floes, tracks, loads and trajectories of a run on the map.
+
+Places are held against geodesics (pyproj.Geod), which the command does not use; files are read by json, by GDAL, by
+xarray and by the program's own reader of outlines.
+"""
+import csv
+import json
+import math
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from osgeo import ogr
+from pyproj import Geod
+
+from harness import DONE, IO, USAGE, area, call, changed, run
+from test_map import ARROW, BOX, LOCAL, ORIGIN, write
+from test_outlines import field, same_ring
+
+import bergtow  # noqa: E402
+from bergtow.maps import export  # noqa: E402
+from bergtow.result.run import Run  # noqa: E402
+
+ogr.UseExceptions()
+GEOD = Geod(ellps="WGS84")
+LON, LAT = 20.0, 76.5
+#: a disc that is towed north into an arrow and turns it; another floe to the east, which stays
+TOW = {"run": {"dt": 0.5, "duration": 30}, "ice": {"outlines": "map.geojson", "thickness": 1, "nonconvex": "split"},
+       "domain": {"frame": "geographic", "length": 200, "width": 160, "ends": "open", "sides": "open"},
+       "body": {"shape": "disc", "length": 10, "draft": 5, "y": -2},
+       "tow": {"mode": "line", "speed": 1, "direction": 0, "ramp": 1, "line_length": 30, "line_stiffness": 1e6,
+               "line_damping": 1e4}, "output": {"frame_interval": 5}}
+
+
+def rings(north, east=0.0):
+    return [[[x + e + east, y + n + north] for x, y in ring] for ring, e, n in ((ARROW, 0, 14), (BOX, 0, 0))]
+
+
+def towed(folder, crs=LOCAL, zero=(0, 0), case=TOW, **more):
+    """A run from a map in metres; its folder."""
+    frame = changed(case, **more)["domain"]["frame"]
+    write(folder, *[ring if frame == "geographic" else [p[::-1] for p in ring[::-1]]
+                    for ring in rings(zero[1], zero[0])], crs={"type": "name", "properties": {"name": crs}})
+    return run(folder, changed(case, **more)).dir
+
+
+def degrees(folder):
+    """A run from a map in degrees: metres along geodesics."""
+    def at(x, y):
+        return GEOD.fwd(LON, LAT, math.degrees(math.atan2(x, y)), math.hypot(x, y))[:2]
+    write(folder, *[[at(*p) for p in ring] for ring in rings(0)])
+    return run(folder, changed(TOW, **ORIGIN)).dir
+
+
+def outlines_of(path):
+    with Run(path) as r:
+        return [np.array(p) for p in r.polygons(-1)], r.pose(0), r.pose(-1)
+
+
+PLACES = {"degrees": degrees, "local": towed,
+          "utm": lambda f: towed(f, "EPSG:32633", (560e3, 8490e3), ice__origin_east=560e3, ice__origin_north=8490e3),
+          "basin": lambda f: towed(f, domain__frame="basin", domain__x0=-100, body__y=-2, body__x=0)}
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_exported_floes_come_back_as_ice_outlines(tmp_path, place):
+    """After a tow that has turned a floe. Red: x and y swapped, rings clockwise, a frame or an origin that is lost."""
+    there = PLACES[place](tmp_path)
+    after, first, last = outlines_of(there)
+    assert abs(last - first)[0, 2] > 0.01 and abs(last - first)[0, :2].max() > 1  # it is another field than the first
+    done = call("export", there, "-o", tmp_path / "map.geojson", "--force")
+    assert done.returncode == DONE, done.stderr
+    case = json.loads((tmp_path / "case.yml").read_text())
+    back, thickness, areas, _ = field(tmp_path, changed(case, body={"shape": "none"}, tow={"mode": "none"},
+                                                        ice__thickness=2))
+    assert thickness.tolist() == [1, 1]
+    for ours, theirs, size in zip(after, back, areas):
+        assert same_ring(ours, theirs, 2e-8 if place == "utm" else 1e-8)  # of 8,490 km in double precision
+        assert area(theirs) == pytest.approx(area(ours), rel=1e-9)
+        assert size == pytest.approx(area(ours), rel=1e-9)
+
+
+def test_degrees_are_those_of_geodesics(tmp_path):
+    """Distance and direction of each vertex from the origin, as its x and y say them; anticlockwise [RFC 7946], and no
+    crs. Red: longitude of north, a sphere."""
+    there = degrees(tmp_path)
+    bergtow.export(there, tmp_path / "after.geojson", time=30)
+    root = json.loads((tmp_path / "after.geojson").read_text())
+    assert "crs" not in root
+    for feature, outline in zip(root["features"], outlines_of(there)[0]):
+        ring = np.array(feature["geometry"]["coordinates"][0])
+        assert (ring[0] == ring[-1]).all() and area(ring) > 0
+        azimuth, _, distance = GEOD.inv(*np.broadcast_to([[LON], [LAT]], (2, len(ring))), *ring.T)
+        found = np.column_stack([distance * np.cos(np.radians(azimuth)), distance * np.sin(np.radians(azimuth))])
+        assert same_ring(found[:-1][::-1], outline, 1e-6)
+    assert [f["properties"]["id"] for f in root["features"]] == [0, 1]
+    assert root["features"][0]["properties"]["time_s"] == 30
+    assert root["features"][0]["properties"]["speed_m_s"] > 0.1 > root["features"][1]["properties"]["speed_m_s"] == 0
+
+
+def test_a_geopackage_has_layers_in_the_crs_of_the_map(tmp_path):
+    """Floes, the iceberg where the tow left it, tracks from start to end, loads of every sample. Red: a crs that is
+    lost, tracks of wrapped or swapped positions."""
+    there = PLACES["utm"](tmp_path)
+    bergtow.export(there, tmp_path / "after.gpkg")
+    file = ogr.Open(str(tmp_path / "after.gpkg"))
+    layers = {file.GetLayer(k).GetName(): file.GetLayer(k) for k in range(file.GetLayerCount())}
+    assert list(layers) == ["floes", "bodies", "tracks", "loads"]
+    assert {layer.GetSpatialRef().GetAuthorityCode(None) for layer in layers.values()} == {"32633"}
+    with Run(there) as r:
+        x, y, time, force = r["body_x"], r["body_y"], r["time"], r["tow_force"]
+        carriage = np.array([r["carriage_y"][-1], r["carriage_x"][-1]])
+        assert [f.GetField("area_m2") for f in layers["floes"]] == pytest.approx(r.area)
+        assert [f.GetGeometryRef().Area() for f in layers["floes"]] == pytest.approx(r.area, rel=1e-6)
+        hull = sum(area(p) for p in r.body_polygons(-1))
+    body, = layers["bodies"]
+    assert body.GetGeometryRef().Area() == pytest.approx(hull, rel=1e-6)
+    middle = body.GetGeometryRef().Centroid()
+    assert (middle.GetX(), middle.GetY()) == pytest.approx((560e3 + y[-1], 8490e3 + x[-1]), abs=1e-6)
+    tracks = {f.GetField("name"): f for f in layers["tracks"]}
+    assert list(tracks) == ["iceberg", "towing end"]
+    way = np.array(tracks["iceberg"].GetGeometryRef().GetPoints())[:, :2] - (560e3, 8490e3)
+    np.testing.assert_allclose(way, np.column_stack([y, x]), atol=1e-6)
+    end = np.array(tracks["towing end"].GetGeometryRef().GetPoints())[-1, :2] - (560e3, 8490e3)
+    np.testing.assert_allclose(end, carriage, atol=1e-6)
+    assert tracks["iceberg"].GetField("length_m") == pytest.approx(np.hypot(np.diff(x), np.diff(y)).sum())
+    loads = list(layers["loads"])
+    assert [f.GetField("time_s") for f in loads] == pytest.approx(time)
+    assert [f.GetField("tow_force") for f in loads] == pytest.approx(force)
+    assert loads[-1].GetGeometryRef().GetY() == pytest.approx(8490e3 + x[-1], abs=1e-6)
+    again = call("outlines", tmp_path / "after.gpkg", "--layer", "floes", "-o", tmp_path / "again.geojson")
+    assert again.returncode == DONE, again.stderr
+
+
+def test_a_shapefile_says_what_it_renamed_and_spares_files_of_others(tmp_path):
+    there = towed(tmp_path)
+    done = call("export", there, "-o", tmp_path / "loads.shp", "--layer", "loads")
+    assert done.returncode == DONE and "ice_resistance is ice_resist" in done.stdout, done.stderr
+    assert ogr.Open(str(tmp_path / "loads.shp")).GetLayer(0).GetFeatureCount() == 60
+    assert call("export", there, "-o", tmp_path / "loads.shp").returncode == DONE  # our own is replaced
+    assert ogr.Open(str(tmp_path / "loads.shp")).GetLayer(0).GetFeatureCount() == 2
+    for name in ("loads.dbf", "other.dbf", "lone.shp"):
+        (tmp_path / name).write_bytes(b"theirs")
+        done = call("export", there, "-o", (tmp_path / name).with_suffix(".shp"))
+        assert done.returncode == IO and (tmp_path / name).read_bytes() == b"theirs"
+    assert not (tmp_path / "other.shp").exists()
+    assert call("export", there, "-o", tmp_path / "other.shp", "--force").returncode == DONE
+
+
+def absent(there, floe, frame):
+    """A floe that a frame does not have: it has been broken, or is not born yet."""
+    with h5py.File(there / "result.h5", "r+") as f:
+        f["frames/pose"][frame, floe] = np.nan
+
+
+def test_trajectories_are_those_of_the_frames(tmp_path):
+    """Decoded by xarray, as OpenDrift's TrajAn and R's readers take them: one trajectory a row, marked by cf_role.
+    Red: a trajectory of another floe, a time that is not decoded, a place where a floe is not."""
+    there = degrees(tmp_path)
+    absent(there, 1, 3)
+    bergtow.export(there, tmp_path / "drift.nc", start="2027-03-01T06:00Z")
+    bergtow.export(there, tmp_path / "drift.csv")
+    with xarray.open_dataset(tmp_path / "drift.nc") as d:
+        assert (d.attrs["Conventions"], d.attrs["featureType"]) == ("CF-1.8", "trajectory")
+        role, = [v for v in d.variables.values() if v.attrs.get("cf_role") == "trajectory_id"]
+        assert role.dims == ("trajectory",)
+        names = [n.decode() for n in role.values]
+        assert names == ["floe 0", "floe 1", "iceberg", "towing end"]
+        assert d.lon.dims == d.lat.dims == d.speed.dims == ("trajectory", "time")
+        assert [d[v].attrs["standard_name"] for v in ("lon", "lat", "time", "thickness")] == [
+            "longitude", "latitude", "time", "sea_ice_thickness"]
+        assert [d[v].attrs["units"] for v in ("lon", "lat", "speed", "thickness")] == [
+            "degrees_east", "degrees_north", "m s-1", "m"]
+        assert "comment" not in d.time.attrs
+        assert str(d.time.values[-1]).startswith("2027-03-01T06:00:30")
+        with Run(there) as r:
+            x = np.stack([r.pose(k) for k in range(r.n_frames)])[:, :, :2]
+            berg, speed = np.stack([r.body_pose(k)[r.towed, :2] for k in range(r.n_frames)]), r.speed(2)
+            ends = r["carriage_x"][-1], r["carriage_y"][-1]
+        assert np.isnan(d.lon.values[1, 3]) and np.isfinite(d.lon.values[0]).all()
+        np.testing.assert_allclose(d.speed.values[:2, 2], speed)
+        for row, way in ((0, x[:, 0]), (2, berg)):
+            azimuth, _, distance = GEOD.inv(*np.broadcast_to([[LON], [LAT]], (2, len(way))), d.lon[row], d.lat[row])
+            np.testing.assert_allclose(distance * np.cos(np.radians(azimuth)), way[:, 0], atol=1e-6)
+            np.testing.assert_allclose(distance * np.sin(np.radians(azimuth)), way[:, 1], atol=1e-6)
+        assert GEOD.inv(LON, LAT, d.lon[3, -1], d.lat[3, -1])[2] == pytest.approx(math.hypot(*ends), abs=1e-6)
+        with open(tmp_path / "drift.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert len(rows) == np.isfinite(d.lon.values).sum()
+        for row in rows:
+            k, t = names.index(row["name"]), round(float(row["time_s"]) / 5)
+            assert (float(row["longitude"]), float(row["latitude"])) == (d.lon.values[k, t], d.lat.values[k, t])
+    floes = tmp_path / "floes.geojson"
+    bergtow.export(there, floes, time="all")
+    at = [(f["properties"]["id"], f["properties"]["time_s"]) for f in json.loads(floes.read_text())["features"]]
+    assert len(at) == 2 * 7 - 1 and (1, 15) not in at and (0, 15) in at
+
+
+def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
+    """PROJ's forward projection of the degrees in the file gives the metres in it. Red: a grid mapping without
+    parameters, latitude first."""
+    import pyproj
+    there = PLACES["utm"](tmp_path)
+    bergtow.export(there, tmp_path / "drift.nc")
+    with xarray.open_dataset(tmp_path / "drift.nc", decode_coords="all") as d:
+        assert pyproj.CRS.from_cf(d.crs.attrs).to_epsg() == 32633 and d.speed.encoding["grid_mapping"] == "crs"
+        there = np.isfinite(d.lon.values)
+        assert there.sum() == there.size - 1  # the towing end has no sample at time zero
+        back = pyproj.Proj("EPSG:32633")(d.lon.values[there], d.lat.values[there])
+        np.testing.assert_allclose(back, [d.x.values[there], d.y.values[there]], rtol=0, atol=1e-6)
+        assert d.time.attrs["comment"].startswith("assumed") and d.time.values[0] == np.datetime64("1970-01-01")
+
+
+def test_ice_that_a_moving_window_renews_is_another_trajectory():
+    """A jump by more than half a period begins one; a slow floe and one that is absent do not. Red: a line across the
+    whole window."""
+    x = np.array([[0.0, 2, 4, 6], [0, 60, 62, 140], [0, np.nan, 3, 4]])
+    piece = export._pieces(np.stack([x, 0 * x], axis=2), np.array([100.0, 0]))
+    assert piece.tolist() == [[0, 0, 0, 0], [0, 1, 1, 2], [0, 0, 0, 0]]
+
+
+def test_ice_around_the_iceberg_is_exported_from_a_periodic_domain(tmp_path):
+    """Where it is, and the window as far ahead of it as it keeps. Red: wrapped into the domain of the first step."""
+    case = {"run": {"dt": 0.5, "duration": 60}, "domain": {"frame": "geographic", "length": 60, "width": 30,
+            "ends": "moving", "sides": "periodic"}, "ice": {"concentration": 0.3, "size": 3, "thickness": 0.3},
+            "body": {"shape": "disc", "length": 4, "draft": 2}, "tow": {"mode": "speed", "speed": 1},
+            "output": {"frame_interval": 10}}
+    there = run(tmp_path, case).dir
+    bergtow.export(there, tmp_path / "after.geojson")
+    bergtow.export(there, tmp_path / "berg.geojson", layer="bodies")
+    with Run(there) as r:
+        berg, ahead = np.array([r["body_y"][-1], r["body_x"][-1]]), r.number("moving_window.ahead_m")
+    body, = json.loads((tmp_path / "berg.geojson").read_text())["features"]
+    hull = np.array(body["geometry"]["coordinates"][0][:-1])
+    assert berg[1] > 50 and (hull.min(axis=0) + hull.max(axis=0)) / 2 == pytest.approx(berg, abs=0.05)
+    east, north = np.array([np.mean(f["geometry"]["coordinates"][0][:-1], axis=0) - berg for f in json.loads(
+        (tmp_path / "after.geojson").read_text())["features"]]).T
+    assert abs(east).max() < 17 and ahead - 3 < north.max() < ahead + 1 and ahead - 61 < north.min() < ahead - 57
+
+
+@pytest.mark.parametrize("words, code, said", [
+    (("-o", "x.gpkg", "--time", "31"), USAGE, "outside the frames, 0 to 30 s"),
+    (("-o", "x.kml"), USAGE, "unknown kind of file"), (("-o", "x.nc", "--layer", "floes"), USAGE, "trajectories"),
+    (("-o", "x.csv", "--start", "2027-03-01"), USAGE, "no dates"), (("-o", "x.nc", "--start", "soon"), USAGE, "no date"),
+    (("-o", "theirs.geojson"), IO, "not made by bergtow"), (("-o", "x.geojson", "--time", "nan"), USAGE, "nan")])
+def test_wrong_use(towed_once, words, code, said):
+    done = call("export", "out", *words, cwd=towed_once)
+    assert done.returncode == code and said in done.stderr
+    assert not list(towed_once.glob("x.*")) and (towed_once / "theirs.geojson").read_text() == "theirs"
+
+
+@pytest.fixture(scope="module")
+def towed_once(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("once")
+    towed(folder)
+    (folder / "theirs.geojson").write_text("theirs")
+    return folder
