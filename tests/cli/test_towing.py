@@ -119,6 +119,14 @@ def test_a_line_with_weight_that_is_too_stiff_for_the_step_is_stable(tmp_path):
     assert coarse[-1] == pytest.approx(fine[-1], rel=0.01) and coarse.max() < 1.05 * fine.max()
 
 
+def test_a_line_of_next_to_no_weight_is_the_straight_one_in_long_steps(tmp_path):
+    """A jerk, at a step of two periods: the same scheme, slack or taut."""
+    case = changed(BERG, run__dt=20, run__duration=400, body__drag=None, tow__line_stiffness=100 * EA)
+    pulls = [run(tmp_path, changed(case, tow__line={"weight": w}), "--quiet", name=f"w{w}").series("tow_force").max()
+             for w in (0, 1e-3)]
+    assert pulls[0] > 1e6 and pulls[1] == pytest.approx(pulls[0], rel=0.02)
+
+
 def test_a_branch_with_weight_breaks_by_the_tension_at_its_ends(tmp_path):
     """The pull at which it parts lies below the breaking load by what the weight adds."""
     heavy = changed(BERG, tow__line={"weight": "2 kN/m", "breaking_load": "2 MN"}, tow__ramp=60)
