@@ -13,7 +13,7 @@
 #define MOST_STATES 1.5e6 ///< of a lattice whose spacing is chosen
 #define MOST_CELLS 3e6  ///< times speeds, of a raster whose cells are chosen
 #define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
-enum { TRIES = 4 };
+enum { TRIES = 4, ARRIVALS = 40 };
 
 // --- routes ----------------------------------------------------------------------------------------------------------
 
@@ -105,8 +105,8 @@ static void repel(bt_planner *p, const bt_route *r)
 // --- what a search finds made into a route ---------------------------------------------------------------------------
 
 /// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
-/// any: the cheapest of all nodes. False when none is allowed.
-static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
+/// any: the cheapest of all nodes. The goal is where it is at the time of arrival. False when none is allowed.
+static bool with_tail(const bt_planner *p, const bt_found *f, double arrival, int tries, bt_route *r)
 {
     const bt_route_task *t = &p->task;
     const double radius = t->radius > 0 ? t->radius : 1e-3 * t->width;
@@ -119,7 +119,7 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
             for (int k = 0; k < (given ? 1 : t->headings); k++) {
                 double from[3] = {f->node[a][0], f->node[a][1], f->node[a][2]}, part[3][2], to[3];
                 if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / t->headings;
-                bt_way_goal(p, 0, from[0], from[1], to);
+                bt_way_goal(p, arrival, from[0], from[1], to);
                 to[2] = given ? t->goal_heading : 2 * BT_PI * k / t->headings;
                 bt_route_dubins(from, to, radius, part);
                 int n = f->node_leg[a];
@@ -139,6 +139,12 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
                 best = c, best_n = n;
                 memcpy(best_leg, leg, (size_t)n * sizeof *leg);
             }
+    const double *u = t->drift;
+    if (best_n > 0 && bt_hypot(u[0], u[1]) * fabs(best.time - arrival) > 1e-6 * t->width && tries > 0) {
+        free(leg);
+        free(best_leg);
+        return with_tail(p, f, best.time, tries - 1, r);
+    }
     const bool allowed = best_n > 0 && !(best.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) {
         double(*corner)[2];
@@ -155,7 +161,7 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
 static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_route *r)
 {
     const bt_route_task *t = &p->task;
-    if (!isnan(t->goal_heading)) return with_tail(p, f, r);
+    if (!isnan(t->goal_heading)) return with_tail(p, f, bt_swath_cost(p, f->n_legs, f->leg, NULL).time, ARRIVALS, r);
     bt_way w = {0}, straight = {0};
     w.point = bt_alloc((size_t)(w.cap = f->n_points + 16), sizeof *w.point);
     const double *last = t->start;
@@ -178,7 +184,7 @@ static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_r
     }
     bool allowed = !(w.cost.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) keep_way(p, r, &w);
-    else allowed = with_tail(p, f, r);
+    else allowed = with_tail(p, f, w.cost.time, ARRIVALS, r);
     free(w.point);
     free(straight.point);
     return allowed;
@@ -276,8 +282,11 @@ static bt_lattice *lattice_of(bt_planner *p)
     const bt_route_task *t = &p->task;
     const double area = (t->extent[2] - t->extent[0]) * (t->extent[3] - t->extent[1]);
     double goal[2], ax = 1, ay = 0, h = t->spacing, cell = t->cell;
-    bt_way_goal(p, 0, t->start[0], t->start[1], goal);
-    const double x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+    double x = 0, y = 0, far = 0;
+    for (int k = 0; k < ARRIVALS; k++) { // where the goal is when the fastest speed has led there, in the frame of the ice
+        bt_way_goal(p, far / t->speed[0], t->start[0], t->start[1], goal);
+        x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+    }
     if (!isnan(t->start_heading)) bt_sincos(t->start_heading, &ay, &ax);
     else if (far > 0) ax = x / far, ay = y / far;
     if (!(h > 0)) h = bt_max(t->width / 4, sqrt(area * t->headings / MOST_STATES));
