@@ -10,8 +10,10 @@
 // Cost. Slices of the swath, as long as the distance q <= W/4 of their places, are added up first, at every place for
 // each heading; the load of a move is the sum of such slices along it, the nearest in place and heading, the same list
 // everywhere. What is found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move,
-// without the error of half of q and of half a step of headings, but thirty times as long. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a metre times the
-// distance to the goal) down: sums do not depend on their order, and of equal costs the lower index goes first.
+// without the error of half of q and of half a step of headings, but thirty times as long.
+// Order. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a
+// metre times the distance to the goal) down: sums do not depend on their order, and of equal costs the lower index
+// goes first.
 #include "route/lattice.h"
 
 #include "base/elementary.h"
@@ -437,7 +439,7 @@ static void split(const bt_lattice *l, int32_t state, int *i, int *j, int *k)
 }
 
 /// The moves that led to a state, as legs and way-points.
-static void follow(const search *s, int32_t last, bt_found *f)
+static void follow(const search *s, int32_t last, bt_lattice_way *f)
 {
     const bt_lattice *l = s->l;
     int n = 0;
@@ -471,7 +473,7 @@ static void follow(const search *s, int32_t last, bt_found *f)
     free(chain);
 }
 
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_found *f)
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_lattice_way *f)
 {
     bt_planner *p = l->p;
     const bt_route_task *t = &p->task;
@@ -495,7 +497,7 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
         s.cost[at] = 0;
         push(&s.open, (entry){bound_of(&s, 0, 0), at});
     }
-    *f = (bt_found){0};
+    *f = (bt_lattice_way){0};
     bool found = false;
     while (s.open.n > 0 && !found) {
         const entry e = pop(&s.open);
@@ -519,7 +521,7 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
     return found;
 }
 
-void bt_found_free(bt_found *f)
+void bt_lattice_way_free(bt_lattice_way *f)
 {
     free(f->point);
     free(f->leg);

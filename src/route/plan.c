@@ -106,11 +106,12 @@ static void repel(bt_planner *p, const bt_route *r)
 
 /// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
 /// any: the cheapest of all nodes. The goal is where it is at the time of arrival. False when none is allowed.
-static bool with_tail(const bt_planner *p, const bt_found *f, double arrival, int tries, bt_route *r)
+static bool with_tail(const bt_planner *p, const bt_lattice_way *f, double arrival, int tries, bt_route *r)
 {
     const bt_route_task *t = &p->task;
     const double radius = t->radius > 0 ? t->radius : 1e-3 * t->width;
-    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg), *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    bt_leg *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
     bt_path_cost best = {.faults = BT_ROUTE_TURNS, .cost = INFINITY};
     int best_n = 0;
     const bool given = !isnan(t->goal_heading), any_start = isnan(t->start_heading);
@@ -158,7 +159,7 @@ static bool with_tail(const bt_planner *p, const bt_found *f, double arrival, in
 }
 
 /// What was found, shortened; the straight line made cheaper, where that is better and direct is set.
-static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_route *r)
+static bool into_route(const bt_planner *p, const bt_lattice_way *f, bool direct, bt_route *r)
 {
     const bt_route_task *t = &p->task;
     if (!isnan(t->goal_heading)) return with_tail(p, f, bt_swath_cost(p, f->n_legs, f->leg, NULL).time, ARRIVALS, r);
@@ -283,7 +284,7 @@ static bt_lattice *lattice_of(bt_planner *p)
     const double area = (t->extent[2] - t->extent[0]) * (t->extent[3] - t->extent[1]);
     double goal[2], ax = 1, ay = 0, h = t->spacing, cell = t->cell;
     double x = 0, y = 0, far = 0;
-    for (int k = 0; k < ARRIVALS; k++) { // where the goal is when the fastest speed has led there, in the frame of the ice
+    for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice when the fastest speed has led there
         bt_way_goal(p, far / t->speed[0], t->start[0], t->start[1], goal);
         x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
     }
@@ -320,12 +321,12 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
         p.penalty = wanted ? REPELS : 1;
         bt_swath_keep(&p);
         for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
-            bt_found f;
+            bt_lattice_way f;
             double limit = t->force_limit, peak = 0;
             bool got = true;
             if (t->objective == BT_ROUTE_PEAK) {
                 got = bt_lattice_search(l, goal, BT_ROUTE_PEAK, limit, &peak, &f);
-                bt_found_free(&f);
+                bt_lattice_way_free(&f);
                 limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
             }
             got = got && bt_lattice_search(l, goal, t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective, limit,
@@ -333,10 +334,10 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
             bt_route *r = &plan->route[plan->n];
             if (!got || !into_route(&p, &f, wanted == 0, r)) {
                 last = true;
-                if (got) bt_found_free(&f);
+                if (got) bt_lattice_way_free(&f);
                 break;
             }
-            bt_found_free(&f);
+            bt_lattice_way_free(&f);
             found_any++;
             kept = wanted == 0 ? apart(r, straight) > 1e-3 * t->width || fabs(r->cost - straight->cost) > 1e-6 * r->cost
                                : true;
