@@ -355,6 +355,13 @@ def test_routes_are_a_width_apart():
         assert far > 0.9 * BERG.width
 
 
+def test_routes_that_cannot_be_a_width_apart_are_not_given():
+    """In a channel one and a half widths wider than the hull. Red: routes that are counted, not compared."""
+    found = plan(NONE, BERG, (50, 70), (750, 70), extent=(0, 0, 800, 140), routes=3, turn_cost=1e3,
+                 no_go=[box(100, -10, 700, 48), box(100, 92, 700, 150)])
+    assert found.status == "fewer_routes" and found.data == {"wanted": 3, "found": 0} and len(found.routes) == 1
+
+
 # --- turns -----------------------------------------------------------------------------------------------------------
 
 def arrived(legs, pose, n=2000):
@@ -455,6 +462,16 @@ def test_speed_of_each_leg_under_a_force_limit():
     turned = plan(ice, BERG, (900, 300), (100, 300), extent=(0, 0, 1000, 600), routes=1, force_limit=2e4,
                   weights=PLOUGH)
     assert turned.status == "start_too_thick"
+
+
+def test_the_search_keeps_the_force_limit():
+    """The shortest way under a limit: through the gap of a barrier, for ice costs nothing else here. Red: a limit that
+    only the pricing of what is found knows."""
+    ice = Ice([box(300, -50, 340, 500), box(300, 540, 340, 650)], [3.0, 3.0])
+    r = best(plan(ice, BERG, (50, 100), (600, 100), extent=(0, 0, 650, 600), objective="length", routes=1,
+                  force_limit=1.5e4, weights=PLOUGH))
+    exact = 2 * math.hypot(250, 410) + 40  # to the edge of the gap, a berg's half width from it
+    assert abs(r.y[np.argmin(abs(r.x - 320))] - 520) < 20 and math.isclose(r.length, exact, rel_tol=0.03)
 
 
 def test_the_least_peak():
