@@ -476,7 +476,8 @@ static void follow(const search *s, int32_t last, bt_lattice_way *f)
     free(chain);
 }
 
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_lattice_way *f)
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak,
+                       bt_lattice_way *f)
 {
     bt_planner *p = l->p;
     const bt_route_task *t = &p->task;
@@ -530,4 +531,5 @@ void bt_lattice_way_free(bt_lattice_way *f)
     free(f->leg);
     free(f->node);
     free(f->node_leg);
+    *f = (bt_lattice_way){0};
 }

@@ -28,7 +28,8 @@ double bt_lattice_spacing(const bt_lattice *l);
 /// The cheapest way from the start to a node within 0.75 of the spacing from the goal (both ends of a line of points,
 /// or twice the same), under a limit of the mean force; for BT_ROUTE_PEAK that of the least largest force, which comes
 /// back in *peak, N. False when there is none.
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_lattice_way *f);
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak,
+                       bt_lattice_way *f);
 void bt_lattice_way_free(bt_lattice_way *f);
 
 #endif

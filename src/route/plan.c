@@ -321,7 +321,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
         p.penalty = wanted ? REPELS : 1;
         bt_swath_keep(&p);
         for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
-            bt_lattice_way f;
+            bt_lattice_way f = {0};
             double limit = t->force_limit, peak = 0;
             bool got = true;
             if (t->objective == BT_ROUTE_PEAK) {
@@ -329,8 +329,14 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
                 bt_lattice_way_free(&f);
                 limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
             }
-            got = got && bt_lattice_search(l, goal, t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective, limit,
-                                           NULL, &f);
+            const int objective = t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective;
+            got = got && bt_lattice_search(l, goal, objective, limit, NULL, &f);
+            if (!got && !isnan(t->goal_heading)) { // a node of that heading may lie where no move ends: the tail turns
+                const double heading = t->goal_heading;
+                p.task.goal_heading = NAN;
+                got = bt_lattice_search(l, goal, objective, limit, NULL, &f);
+                p.task.goal_heading = heading;
+            }
             bt_route *r = &plan->route[plan->n];
             if (!got || !into_route(&p, &f, wanted == 0, r)) {
                 last = true;
