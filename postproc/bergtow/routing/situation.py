@@ -205,6 +205,7 @@ class Situation:
     place: Place
     ice: planner.Ice
     hull: planner.Hull
+    mass: float           #: of the body with its added mass, kg
     outline: np.ndarray   #: [n, 2] of the hull, m from its centroid, at yaw 0
     start: tuple          #: (x, y), m
     extent: tuple         #: (x0, y0, x1, y1), m
@@ -274,7 +275,7 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
         outlines = [sim.outline(i) for i in range(sim.n_bodies)]
         floes = np.flatnonzero(ice & (motion != FIXED))
         fixed = [outlines[i] for i in np.flatnonzero((motion == FIXED) & ice)]
-        skin, form = sim.drags[body, :2]
+        (skin, form), mass = sim.drags[body, :2], sim.masses[body, 0]
         start, radius = sim.positions[body], sim.radii[body]
         drift = sim.velocities[floes, :2].mean(axis=0) if len(floes) else np.zeros(2)
         thickness = sim.thicknesses[floes]
@@ -290,8 +291,8 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
         case=case, field=field_file, values=values, place=place,
         ice=planner.Ice(outlines=[outlines[i] for i in floes], thickness=thickness, density=density,
                         added_mass=values["ice.added_mass"], rafting=rafting),
-        hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), outline=hull @ np.array([[c, -s],
-                                                                                                            [s, c]]),
+        hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), mass=mass,
+        outline=hull @ np.array([[c, -s], [s, c]]),
         start=tuple(map(float, start[:2])),
         extent=(x0, y0, x0 + values["domain.length"], y0 + values["domain.width"]), no_go=areas + fixed,
         drift=tuple(map(float, drift)), water=water,
