@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS = {
     "base": "numbers, text, files, JSON, HDF5, MPI",
     "geometry": "polygons, outlines, paths",
+    "route": "a way through known ice",
     "case": "keys, reading, checks",
     "body": "arrays of bodies",
     "tow": "line, vessel, speed",

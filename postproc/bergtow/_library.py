@@ -12,7 +12,7 @@ import json
 import os
 import threading
 from collections.abc import Callable
-from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint64, c_void_p
+from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint64, c_void_p
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +49,35 @@ class Mean(ctypes.Structure):
     """bt_mean: of a correlated series, evenly spaced; its 95 % interval, correlation time and independent samples."""
     _fields_ = [("mean", c_double), ("sd", c_double), ("se", c_double), ("low", c_double), ("high", c_double),
                 ("tau", c_double), ("n_eff", c_double), ("n", c_int64)]
+
+
+class RouteTask(ctypes.Structure):
+    """bt_route_task"""
+    _fields_ = [("n_floes", c_int64), ("floe_first", POINTER(c_int64)), ("floe", POINTER(c_double)),
+                ("thickness", POINTER(c_double)), ("density", c_double), ("added_mass", c_double),
+                ("jam_cover", c_double), ("rafting", c_double), ("width", c_double), ("reach", c_double),
+                ("drag", c_double), ("start", c_double * 2), ("goal", c_double * 4), ("extent", c_double * 4),
+                ("start_heading", c_double), ("goal_heading", c_double), ("speed", c_double * 16),
+                ("force_limit", c_double), ("force_factor", c_double), ("n_no_go", c_int64),
+                ("no_go_first", POINTER(c_int64)), ("no_go", POINTER(c_double)), ("clearance", c_double),
+                ("radius", c_double), ("spacing", c_double), ("cell", c_double), ("turn_cost", c_double),
+                ("weight", c_double * 5), ("drift", c_double * 2), ("water", c_double * 2), ("goal_is_line", c_int32),
+                ("n_speeds", c_int32), ("objective", c_int32), ("headings", c_int32), ("routes", c_int32)]
+
+
+class RouteFound(ctypes.Structure):
+    """bt_route; a stretch is eight doubles."""
+    _fields_ = [("n_corners", c_int64), ("n_stretches", c_int64), ("corner", POINTER(c_double)),
+                ("stretch", POINTER(c_double)), ("radius", c_double), ("length", c_double), ("duration", c_double),
+                ("work", c_double), ("force", c_double), ("peak", c_double), ("cost", c_double),
+                ("term", c_double * 5), ("ice_area", c_double), ("ice_mass", c_double), ("clearance", c_double),
+                ("faults", c_int64)]
+
+
+class RoutePlan(ctypes.Structure):
+    """bt_route_plan"""
+    _fields_ = [("status", c_int32), ("n", c_int32), ("force", c_double), ("states", c_int64), ("spacing", c_double),
+                ("cell", c_double), ("route", RouteFound * 17)]
 
 
 class Status(c_int):
@@ -90,6 +119,11 @@ _SIGNATURES = {
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
     "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
+    "bt_route_make": (None, POINTER(RouteTask), POINTER(RoutePlan)),
+    "bt_route_straight": (None, POINTER(RouteTask), POINTER(RoutePlan)),
+    "bt_route_free": (None, POINTER(RoutePlan)),
+    "bt_route_cover": (None, POINTER(RouteTask), c_int64, c_int64, POINTER(c_double)),
+    "bt_route_dubins": (c_double, POINTER(c_double), POINTER(c_double), c_double, POINTER(c_double)),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),

@@ -70,19 +70,23 @@ static const bt_leg *leg_at(const bt_path *p, double way)
     return &p->leg[k];
 }
 
-void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
+void bt_leg_at(const bt_leg *l, double way, double at[2], double tangent[2])
 {
-    const bt_leg *l = leg_at(p, way);
-    const double s = way - l->way;
-    double along = s, aside = 0, c = 1, d = 0;
+    double along = way, aside = 0, c = 1, d = 0;
     if (l->turn != 0) {
-        c = bt_cos(s * l->turn), d = bt_sin(s * l->turn);
+        c = bt_cos(way * l->turn), d = bt_sin(way * l->turn);
         along = d / l->turn, aside = (1 - c) / l->turn;
     }
     at[0] = l->x + along * l->tx - aside * l->ty;
     at[1] = l->y + along * l->ty + aside * l->tx;
     tangent[0] = c * l->tx - d * l->ty;
     tangent[1] = c * l->ty + d * l->tx;
+}
+
+void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
+{
+    const bt_leg *l = leg_at(p, way);
+    bt_leg_at(l, way - l->way, at, tangent);
 }
 
 double bt_path_near(const bt_path *p, double way, double x, double y)

@@ -28,6 +28,9 @@ typedef struct bt_path {
 /// points coincide, a rounded corner has no room on its legs, or turns back on itself.
 bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200]);
 
+/// Position and unit tangent after `way` m of a leg (before its start: backwards).
+void bt_leg_at(const bt_leg *l, double way, double at[2], double tangent[2]);
+
 /// Position and unit tangent after `way` m of it (before the start: on the straight line backwards).
 void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2]);
 

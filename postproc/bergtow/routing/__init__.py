@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Route and speed of a tow through known ice: planned, then verified by tows."""
+"""Routes of a tow through ice whose floes are known."""

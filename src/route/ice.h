@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Ice on a raster: exact areas of floes in cells, and the force per metre of width that follows from them.
+#ifndef BERGTOW_ROUTE_ICE_H
+#define BERGTOW_ROUTE_ICE_H
+
+#include "bergtow/route.h"
+
+/// What is kept of a cell.
+enum { BT_ICE_COVER, BT_ICE_MASS, BT_ICE_LARGE, BT_ICE_RAFT, BT_ICE_FIELDS };
+
+typedef struct bt_route_ice {
+    int nx, ny, n_speeds;
+    double cell, x0, y0; ///< m; its lowest corner, in the frame of the raster
+    double ax, ay;       ///< the frame's x axis in that of the task, unit vector
+    double ox, oy;       ///< the frame's origin in that of the task, m
+    /// [ny][nx] c; m, kg/m²; m max(0, D/W − 1), kg/m²; c h², m²
+    float *field[BT_ICE_FIELDS];
+    float *mean[BT_ICE_FIELDS]; ///< the same averaged over squares of 4 W
+    float *load;                ///< [ny][nx][n_speeds] weighted force without water, N/m
+} bt_route_ice;
+
+/// A place of the task in cells of the raster.
+static inline void bt_route_ice_place(const bt_route_ice *r, double x, double y, double at[2])
+{
+    const double dx = x - r->ox, dy = y - r->oy;
+    at[0] = (dx * r->ax + dy * r->ay - r->x0) / r->cell;
+    at[1] = (dy * r->ax - dx * r->ay - r->y0) / r->cell;
+}
+
+/// Rasters of a task in the frame at (ox, oy) with the x axis (ax, ay), of nx × ny cells from (x0, y0) on.
+void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t);
+void bt_route_ice_free(bt_route_ice *r);
+
+/// Terms of the force per metre of width of cell k at speed v, unweighted; water stays 0.
+void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v, double term[BT_ROUTE_TERMS]);
+
+/// Adds weight × area of a polygon of n points [n][2], in cells, to sums [ny][nx + 2], which bt_route_ice_sum ends.
+void bt_route_ice_add(double *sums, int nx, int ny, int64_t n, const double *v, double weight);
+/// Running sums along x: sums [ny][nx + 2] become areas in cells.
+void bt_route_ice_sum(double *sums, int nx, int ny);
+
+#endif

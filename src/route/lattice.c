@@ -1,0 +1,488 @@
+// SPDX-License-Identifier: MIT
+// A lattice of poses, its moves, and A* over them; route/lattice.h.
+//
+// Poses. Places are whole multiples of the spacing; headings are those of vectors of small whole numbers, 16 or 32
+// nearly even ones, so that a straight move ends on a place.
+// Moves from a heading u0: straight on; and turns by one or two headings to u1 on an arc of radius R or 2 R, as
+//     straight a − T, arc, straight b − T,   T = R tan(δ/2),   a u0 + b u1 = whole multiples of the spacing, a, b >= T
+// of which the shortest is taken: a move is a corner of a path through way-points, and the path that is found is one.
+// With R = 0 the shortest is a turn on the spot.
+// Cost. The swath of a move is a list of cells with the area that each stands for, the same at every place. Costs are
+// rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a metre times the
+// distance to the goal) down: sums do not depend on their order, and of equal costs the lower index goes first.
+#include "route/lattice.h"
+
+#include "base/elementary.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { MOST_HEADINGS = 32, MOST_MOVES = 9 };
+#define UNITS 1e5 ///< of cost in the least cost of a spacing
+#define THERE 0.75 ///< spacings from the goal
+
+typedef struct move {
+    int dx, dy, heading;     ///< places; heading after it
+    double length, turned;   ///< m; rad
+    double corner;           ///< a, m; the corner of a turn is so far ahead
+    int n_legs;
+    bt_leg leg[3];           ///< in the frame of the lattice, from the origin
+    double mid[2];           ///< the place halfway, m
+    double water[BT_ROUTE_SPEEDS]; ///< mean water drag, N
+    int n_cells;
+    int64_t *cell;           ///< [n_cells] from the cell whose lower left corner is at the node
+    double *area;            ///< [n_cells] m²
+} move;
+
+struct bt_lattice {
+    bt_planner *p;
+    double h, ax, ay;
+    int i0, j0, nx, ny, n_headings, per_place;
+    double step;             ///< largest angle between neighbouring headings, rad
+    int vector[MOST_HEADINGS][2];
+    double unit[MOST_HEADINGS][2];
+    move of[MOST_HEADINGS][MOST_MOVES];
+    int n_moves[MOST_HEADINGS];
+};
+
+// --- moves ----------------------------------------------------------------------------------------------------------
+
+static void choose_headings(bt_lattice *l, int n)
+{
+    static const int first[2][8][2] = {{{1, 0}, {2, 1}, {1, 1}, {1, 2}},
+                                       {{1, 0}, {5, 1}, {5, 2}, {3, 2}, {1, 1}, {2, 3}, {2, 5}, {1, 5}}};
+    l->n_headings = n;
+    for (int k = 0; k < n; k++) {
+        const int *v = first[n == 32][k % (n / 4)];
+        int x = v[0], y = v[1];
+        for (int quarter = 0; quarter < k / (n / 4); quarter++) {
+            const int was = x;
+            x = -y, y = was;
+        }
+        l->vector[k][0] = x, l->vector[k][1] = y;
+        const double length = sqrt((double)(x * x + y * y));
+        l->unit[k][0] = x / length, l->unit[k][1] = y / length;
+    }
+    for (int k = 0; k < n; k++) {
+        const double *u = l->unit[k], *w = l->unit[(k + 1) % n];
+        l->step = bt_max(l->step, bt_atan2(u[0] * w[1] - u[1] * w[0], u[0] * w[0] + u[1] * w[1]));
+    }
+}
+
+static void add_leg(move *m, double length, double turn)
+{
+    if (!(length > 1e-9)) return;
+    double at[2] = {0, 0}, t[2];
+    if (m->n_legs) bt_leg_at(&m->leg[m->n_legs - 1], m->leg[m->n_legs - 1].length, at, t);
+    else t[0] = m->leg[0].tx, t[1] = m->leg[0].ty;
+    m->leg[m->n_legs++] = (bt_leg){.length = length, .x = at[0], .y = at[1], .tx = t[0], .ty = t[1], .turn = turn};
+    m->length += length;
+}
+
+/// A turn from heading k to k + by on arcs of this radius; false when it is the same as another one.
+static bool make_turn(const bt_lattice *l, int k, int by, double radius, move *m)
+{
+    const int to = (k + by + l->n_headings) % l->n_headings;
+    const double *u = l->unit[k], *w = l->unit[to], cross = u[0] * w[1] - u[1] * w[0];
+    const double angle = bt_atan2(cross, u[0] * w[0] + u[1] * w[1]), cut = radius * bt_tan(0.5 * fabs(angle));
+    const int reach = (int)(2 * cut / l->h) + 8;
+    double best = INFINITY, a_best = 0, b_best = 0;
+    *m = (move){.heading = to, .turned = fabs(angle)};
+    for (int y = -reach; y <= reach; y++)
+        for (int x = -reach; x <= reach; x++) {
+            const double a = l->h * (x * w[1] - y * w[0]) / cross, b = l->h * (y * u[0] - x * u[1]) / cross;
+            if (a < cut - 1e-9 * l->h || b < cut - 1e-9 * l->h || !(a + b < best - 1e-9 * l->h)) continue;
+            best = a + b;
+            a_best = a, b_best = b;
+            m->dx = x, m->dy = y;
+        }
+    m->corner = a_best;
+    m->leg[0].tx = u[0], m->leg[0].ty = u[1];
+    add_leg(m, a_best - cut, 0);
+    if (radius > 0) add_leg(m, radius * fabs(angle), copysign(1 / radius, angle));
+    if (!(radius > 0) && m->n_legs) m->leg[m->n_legs].tx = w[0], m->leg[m->n_legs].ty = w[1];
+    add_leg(m, b_best - cut, 0);
+    return true;
+}
+
+static void make_moves(bt_lattice *l, double radius)
+{
+    for (int k = 0; k < l->n_headings; k++) {
+        move *m = l->of[k];
+        const int *v = l->vector[k];
+        *m = (move){.dx = v[0], .dy = v[1], .heading = k};
+        m->leg[0].tx = l->unit[k][0], m->leg[0].ty = l->unit[k][1];
+        add_leg(m, l->h * sqrt((double)(v[0] * v[0] + v[1] * v[1])), 0);
+        int n = 1;
+        for (int by = -2; by <= 2; by++)
+            for (int wide = 1; by != 0 && wide <= (radius > 0 ? 2 : 1); wide++)
+                make_turn(l, k, by, wide * radius, &m[n++]);
+        l->n_moves[k] = n;
+    }
+}
+
+/// Cells of a move, by points half a cell apart or less.
+static void make_mask(const bt_lattice *l, move *m, int half)
+{
+    const bt_planner *p = l->p;
+    const double cell = p->ice.cell, w = p->task.width;
+    const int wide = 2 * half + 1, across = (int)ceil(2 * w / cell);
+    double *area = bt_alloc((size_t)wide * (size_t)wide, sizeof *area);
+    double way = 0;
+    for (int g = 0; g < m->n_legs; g++) {
+        const bt_leg *leg = &m->leg[g];
+        const int along = (int)ceil(2 * leg->length / cell);
+        for (int a = 0; a < along; a++) {
+            double at[2], t[2];
+            bt_leg_at(leg, (a + 0.5) * leg->length / along, at, t);
+            for (int b = 0; b < across; b++) {
+                const double aside = w * ((b + 0.5) / across - 0.5);
+                const int i = half + (int)floor((at[0] - aside * t[1]) / cell);
+                const int j = half + (int)floor((at[1] + aside * t[0]) / cell);
+                area[(int64_t)j * wide + i] += leg->length / along * w / across * bt_max(0, 1 - leg->turn * aside);
+            }
+        }
+        if (way <= 0.5 * m->length) bt_leg_at(leg, bt_min(leg->length, 0.5 * m->length - way), m->mid, (double[2]){0});
+        way += leg->length;
+    }
+    for (int64_t c = 0; c < (int64_t)wide * wide; c++) m->n_cells += area[c] > 0;
+    m->cell = bt_alloc((size_t)m->n_cells + 1, sizeof *m->cell);
+    m->area = bt_alloc((size_t)m->n_cells + 1, sizeof *m->area);
+    int n = 0;
+    for (int j = 0; j < wide; j++)
+        for (int i = 0; i < wide; i++)
+            if (area[(int64_t)j * wide + i] > 0) {
+                m->cell[n] = (int64_t)(j - half) * p->ice.nx + (i - half);
+                m->area[n++] = area[(int64_t)j * wide + i];
+            }
+    free(area);
+    for (int s = 0; s < p->task.n_speeds; s++) {
+        double sum = 0;
+        for (int g = 0; g < m->n_legs; g++) {
+            double at[2], t[2];
+            bt_leg_at(&m->leg[g], 0.5 * m->leg[g].length, at, t);
+            sum += m->leg[g].length * bt_swath_water(p, t[0] * l->ax - t[1] * l->ay, t[0] * l->ay + t[1] * l->ax,
+                                                     p->task.speed[s]);
+        }
+        m->water[s] = m->length > 0 ? sum / m->length : 0;
+    }
+}
+
+bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing, double cell)
+{
+    const bt_route_task *t = &p->task;
+    bt_lattice *l = bt_alloc(1, sizeof *l);
+    l->p = p, l->h = spacing, l->ax = ax, l->ay = ay;
+    choose_headings(l, t->headings);
+    make_moves(l, t->radius);
+    double longest = 0, low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int k = 0; k < l->n_headings; k++)
+        for (int m = 0; m < l->n_moves[k]; m++) longest = bt_max(longest, l->of[k][m].length);
+    for (int c = 0; c < 4; c++) {
+        const double x = t->extent[c & 1 ? 2 : 0] - t->start[0], y = t->extent[c & 2 ? 3 : 1] - t->start[1];
+        const double at[2] = {x * ax + y * ay, y * ax - x * ay};
+        for (int a = 0; a < 2; a++) low[a] = bt_min(low[a], at[a]), high[a] = bt_max(high[a], at[a]);
+    }
+    l->i0 = (int)ceil(low[0] / spacing), l->j0 = (int)ceil(low[1] / spacing);
+    l->nx = (int)floor(high[0] / spacing) - l->i0 + 1, l->ny = (int)floor(high[1] / spacing) - l->j0 + 1;
+    l->per_place = l->n_headings;
+
+    const int fine = (int)(spacing / cell + 0.5), half = (int)ceil((longest + t->width) / cell) + 1;
+    p->ice = (bt_route_ice){.nx = (l->nx - 1) * fine + 2 * half + 1, .ny = (l->ny - 1) * fine + 2 * half + 1,
+                            .cell = cell, .x0 = (l->i0 * fine - half) * cell, .y0 = (l->j0 * fine - half) * cell,
+                            .ax = ax, .ay = ay, .ox = t->start[0], .oy = t->start[1]};
+    bt_route_ice_make(&p->ice, t);
+    for (int k = 0; k < l->n_headings; k++)
+        for (int m = 0; m < l->n_moves[k]; m++) make_mask(l, &l->of[k][m], half);
+    return l;
+}
+
+void bt_lattice_free(bt_lattice *l)
+{
+    for (int k = 0; k < l->n_headings; k++)
+        for (int m = 0; m < l->n_moves[k]; m++) {
+            free(l->of[k][m].cell);
+            free(l->of[k][m].area);
+        }
+    free(l);
+}
+
+double bt_lattice_spacing(const bt_lattice *l)
+{
+    return l->h;
+}
+
+// --- the open list ---------------------------------------------------------------------------------------------------
+
+typedef struct entry {
+    int64_t bound;
+    int32_t state;
+} entry;
+
+typedef struct heap {
+    entry *e;
+    size_t n, cap;
+} heap;
+
+static bool before(entry a, entry b)
+{
+    return a.bound != b.bound ? a.bound < b.bound : a.state < b.state;
+}
+
+static void push(heap *q, entry e)
+{
+    if (q->n == q->cap) q->e = bt_realloc(q->e, q->cap = q->cap ? 2 * q->cap : 1024, sizeof *q->e);
+    size_t k = q->n++;
+    for (; k > 0 && before(e, q->e[(k - 1) / 2]); k = (k - 1) / 2) q->e[k] = q->e[(k - 1) / 2];
+    q->e[k] = e;
+}
+
+static entry pop(heap *q)
+{
+    const entry top = q->e[0], last = q->e[--q->n];
+    size_t k = 0;
+    for (size_t child; (child = 2 * k + 1) < q->n; k = child) {
+        if (child + 1 < q->n && before(q->e[child + 1], q->e[child])) child++;
+        if (!before(q->e[child], last)) break;
+        q->e[k] = q->e[child];
+    }
+    q->e[k] = last;
+    return top;
+}
+
+// --- search ----------------------------------------------------------------------------------------------------------
+
+typedef struct search {
+    const bt_lattice *l;
+    int objective;
+    double limit, least;  ///< of the mean force, N; least cost of a metre
+    double unit;          ///< of cost
+    double goal[4];       ///< in the frame of the lattice, m
+    int64_t *cost;        ///< [states]
+    int32_t *from;
+    float *time;          ///< s; NULL = nothing moves
+    uint8_t *by, *done;
+    heap open;
+} search;
+
+/// Distance of a place of the lattice to the goal, m.
+static double to_goal(const search *s, int i, int j)
+{
+    const double x = i * s->l->h - s->goal[0], y = j * s->l->h - s->goal[1];
+    const double ex = s->goal[2] - s->goal[0], ey = s->goal[3] - s->goal[1], square = ex * ex + ey * ey;
+    const double dot = x * ex + y * ey, f = dot <= 0 || !(square > 0) ? 0 : dot >= square ? 1 : dot / square;
+    return bt_hypot(x - f * ex, y - f * ey);
+}
+
+static int64_t bound_of(const search *s, int i, int j)
+{
+    if (s->objective == BT_ROUTE_PEAK) return 0;
+    return (int64_t)(bt_max(0, to_goal(s, i, j) - THERE * s->l->h) * s->least / s->unit);
+}
+
+static double least_cost(const bt_planner *p, int objective)
+{
+    const bt_route_task *t = &p->task;
+    if (objective == BT_ROUTE_LENGTH) return 1;
+    if (objective == BT_ROUTE_TIME) return 1 / t->speed[0];
+    enum { DIRECTIONS = 256 };
+    double least = INFINITY;
+    for (int k = 0; k < DIRECTIONS; k++)
+        for (int s = 0; s < t->n_speeds; s++) {
+            double sine, cosine;
+            bt_sincos(2 * BT_PI * k / DIRECTIONS, &sine, &cosine);
+            least = bt_min(least, bt_swath_water(p, cosine, sine, t->speed[s]));
+        }
+    return 0.999 * bt_max(1e-3, t->weight[0]) * least; // between the directions it is less by 3e-4 at most
+}
+
+static bool is_goal(const search *s, int i, int j, int k)
+{
+    const bt_lattice *l = s->l;
+    const double heading = l->p->task.goal_heading;
+    if (to_goal(s, i, j) > THERE * l->h) return false;
+    if (isnan(heading)) return true;
+    double sine, cosine;
+    bt_sincos(heading, &sine, &cosine);
+    const double x = cosine * l->ax + sine * l->ay, y = sine * l->ax - cosine * l->ay, *u = l->unit[k];
+    return fabs(bt_atan2(u[0] * y - u[1] * x, u[0] * x + u[1] * y)) < 0.51 * l->step;
+}
+
+static bt_leg placed(const bt_lattice *l, const bt_leg *leg, double x, double y)
+{
+    const double *o = l->p->task.start, fx = x + leg->x, fy = y + leg->y;
+    bt_leg out = *leg;
+    out.x = o[0] + fx * l->ax - fy * l->ay, out.y = o[1] + fx * l->ay + fy * l->ax;
+    out.tx = leg->tx * l->ax - leg->ty * l->ay, out.ty = leg->tx * l->ay + leg->ty * l->ax;
+    return out;
+}
+
+static double factor_at(const bt_lattice *l, double x, double y)
+{
+    const bt_planner *p = l->p;
+    if (!p->near) return 1;
+    const int64_t i = (int64_t)((x - p->ice.x0) / p->ice.cell), j = (int64_t)((y - p->ice.y0) / p->ice.cell);
+    return p->near[j * p->ice.nx + i] ? p->penalty : 1;
+}
+
+/// Cost and time of a move from a place, in units; −1: not allowed.
+static int64_t price(const search *s, const move *m, int i, int j, double time, double *took)
+{
+    const bt_lattice *l = s->l;
+    const bt_planner *p = l->p;
+    const bt_route_task *t = &p->task;
+    const double turn = t->turn_cost * m->turned, h = l->h;
+    *took = 0;
+    if (!(m->length > 0)) return s->objective == BT_ROUTE_PEAK ? 0 : (int64_t)ceil(turn / s->unit);
+    const int64_t fine = (int64_t)(h / p->ice.cell + 0.5), half_x = (int64_t)(-p->ice.x0 / p->ice.cell + 0.5),
+                  half_y = (int64_t)(-p->ice.y0 / p->ice.cell + 0.5);
+    const int64_t base = (j * fine + half_y) * p->ice.nx + i * fine + half_x;
+    double load[BT_ROUTE_SPEEDS] = {0};
+    if (t->n_speeds == 1) {
+        double sum = 0;
+        for (int c = 0; c < m->n_cells; c++) sum += m->area[c] * p->ice.load[base + m->cell[c]];
+        load[0] = sum;
+    } else {
+        for (int c = 0; c < m->n_cells; c++) {
+            const float *f = p->ice.load + (base + m->cell[c]) * t->n_speeds;
+            for (int v = 0; v < t->n_speeds; v++) load[v] += m->area[c] * f[v];
+        }
+    }
+    bt_stretch_cost c = bt_swath_choose(p, m->length, load, m->water, s->limit);
+    if (c.over) return -1;
+    *took = c.time;
+    double now = time;
+    for (int g = 0; g < m->n_legs; g++) {
+        const bt_leg leg = placed(l, &m->leg[g], i * h, j * h);
+        if (bt_no_go_faults(&p->no_go, &leg, leg.length, now, t->speed[c.speed])) return -1;
+        now += leg.length / t->speed[c.speed];
+    }
+    const double factor = factor_at(l, i * h + m->mid[0], j * h + m->mid[1]);
+    if (s->objective == BT_ROUTE_PEAK) return (int64_t)ceil((c.force * factor) / s->unit);
+    const double measure = t->objective == BT_ROUTE_PEAK ? c.work : c.measure;
+    return (int64_t)ceil((factor * measure + turn) / s->unit);
+}
+
+static void look(search *s, int32_t from, int i, int j, int k)
+{
+    const bt_lattice *l = s->l;
+    for (int a = 0; a < l->n_moves[k]; a++) {
+        const move *m = &l->of[k][a];
+        const int x = i + m->dx, y = j + m->dy;
+        if (x < l->i0 || y < l->j0 || x >= l->i0 + l->nx || y >= l->j0 + l->ny) continue;
+        const int32_t to = ((y - l->j0) * l->nx + (x - l->i0)) * l->n_headings + m->heading;
+        if (s->done[to]) continue;
+        const int64_t so_far = s->cost[from];
+        const bool peak = s->objective == BT_ROUTE_PEAK;
+        // what it costs at least
+        if (s->cost[to] <= so_far + (peak ? 0 : (int64_t)(m->length * s->least / s->unit))) continue;
+        double took;
+        const int64_t more = price(s, m, i, j, s->time ? s->time[from] : 0, &took);
+        if (more < 0) continue;
+        const int64_t cost = peak ? (more > so_far ? more : so_far) : so_far + more;
+        if (cost >= s->cost[to]) continue;
+        s->cost[to] = cost;
+        s->from[to] = from;
+        s->by[to] = (uint8_t)a;
+        if (s->time) s->time[to] = (float)(s->time[from] + took);
+        push(&s->open, (entry){cost + bound_of(s, x, y), to});
+    }
+}
+
+static void split(const bt_lattice *l, int32_t state, int *i, int *j, int *k)
+{
+    *k = state % l->n_headings;
+    *i = l->i0 + state / l->n_headings % l->nx;
+    *j = l->j0 + state / l->n_headings / l->nx;
+}
+
+/// The moves that led to a state, as legs and way-points.
+static void follow(const search *s, int32_t last, bt_found *f)
+{
+    const bt_lattice *l = s->l;
+    int n = 0;
+    for (int32_t at = last; s->from[at] >= 0; at = s->from[at]) n++;
+    int32_t *chain = bt_alloc((size_t)n + 1, sizeof *chain);
+    chain[n] = last;
+    for (int k = n; k > 0; k--) chain[k - 1] = s->from[chain[k]];
+    f->point = bt_alloc((size_t)n + 1, sizeof *f->point);
+    f->leg = bt_alloc(3 * (size_t)n + 1, sizeof *f->leg);
+    f->node = bt_alloc((size_t)n + 1, sizeof *f->node);
+    f->node_leg = bt_alloc((size_t)n + 1, sizeof *f->node_leg);
+    for (int a = 0; a <= n; a++) {
+        int i, j, k;
+        split(l, chain[a], &i, &j, &k);
+        const double *u = l->unit[k], x = i * l->h, y = j * l->h;
+        const bt_leg here = placed(l, &(bt_leg){.tx = u[0], .ty = u[1]}, x, y);
+        f->node[a][0] = here.x, f->node[a][1] = here.y, f->node[a][2] = bt_atan2(here.ty, here.tx);
+        f->node_leg[a] = f->n_legs;
+        if (a == n) {
+            f->point[f->n_points][0] = here.x, f->point[f->n_points++][1] = here.y;
+            break;
+        }
+        const move *m = &l->of[k][s->by[chain[a + 1]]];
+        for (int g = 0; g < m->n_legs; g++) f->leg[f->n_legs++] = placed(l, &m->leg[g], x, y);
+        if (m->turned > 0) {
+            f->point[f->n_points][0] = here.x + m->corner * here.tx;
+            f->point[f->n_points++][1] = here.y + m->corner * here.ty;
+        }
+    }
+    f->n_nodes = n + 1;
+    free(chain);
+}
+
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_found *f)
+{
+    bt_planner *p = l->p;
+    const bt_route_task *t = &p->task;
+    const size_t states = (size_t)l->nx * (size_t)l->ny * (size_t)l->n_headings;
+    search s = {.l = l, .objective = objective, .limit = limit};
+    for (int a = 0; a < 4; a += 2) {
+        const double x = goal[a] - t->start[0], y = goal[a + 1] - t->start[1];
+        s.goal[a] = x * l->ax + y * l->ay, s.goal[a + 1] = y * l->ax - x * l->ay;
+    }
+    s.least = least_cost(p, objective == BT_ROUTE_PEAK || t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : objective);
+    s.unit = objective == BT_ROUTE_PEAK ? 1e-3 * s.least : s.least * l->h / UNITS;
+    s.cost = bt_alloc(states, sizeof *s.cost);
+    s.from = bt_alloc(states, sizeof *s.from);
+    s.by = bt_alloc(states, sizeof *s.by);
+    s.done = bt_alloc(states, sizeof *s.done);
+    if (t->drift[0] != 0 || t->drift[1] != 0) s.time = bt_alloc(states, sizeof *s.time);
+    for (size_t k = 0; k < states; k++) s.cost[k] = INT64_MAX, s.from[k] = -1;
+    for (int k = 0; k < l->n_headings; k++) {
+        if (!isnan(t->start_heading) && k > 0) break; // the frame's x axis is the heading
+        const int32_t at = (-l->j0 * l->nx - l->i0) * l->n_headings + k;
+        s.cost[at] = 0;
+        push(&s.open, (entry){bound_of(&s, 0, 0), at});
+    }
+    *f = (bt_found){0};
+    bool found = false;
+    while (s.open.n > 0 && !found) {
+        const entry e = pop(&s.open);
+        if (s.done[e.state]) continue;
+        s.done[e.state] = 1;
+        p->states++;
+        int i, j, k;
+        split(l, e.state, &i, &j, &k);
+        if (is_goal(&s, i, j, k)) {
+            found = true;
+            if (peak) *peak = (double)s.cost[e.state] * s.unit;
+            follow(&s, e.state, f);
+        } else look(&s, e.state, i, j, k);
+    }
+    free(s.cost);
+    free(s.from);
+    free(s.by);
+    free(s.done);
+    free(s.time);
+    free(s.open.e);
+    return found;
+}
+
+void bt_found_free(bt_found *f)
+{
+    free(f->point);
+    free(f->leg);
+    free(f->node);
+    free(f->node_leg);
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// A* over places and headings; the moves: lattice.c.
+#ifndef BERGTOW_ROUTE_LATTICE_H
+#define BERGTOW_ROUTE_LATTICE_H
+
+#include "route/swath.h"
+
+typedef struct bt_lattice bt_lattice;
+
+/// What a search finds.
+typedef struct bt_found {
+    int n_points;
+    double (*point)[2]; ///< [n_points] corners and the last node, m, without the start; none: nothing was found
+    int n_legs;
+    bt_leg *leg;        ///< [n_legs] the same as legs and arcs
+    int n_nodes;
+    double (*node)[3];  ///< [n_nodes] x, y, m, and heading, rad: the start, and each node after it
+    int *node_leg;      ///< [n_nodes] legs up to it
+} bt_found;
+
+/// A lattice of places `spacing` m apart over the extent of p->task, through its start, with the x axis along (ax, ay);
+/// and p->ice, in its frame, with cells of `cell` m, of which the spacing is a multiple.
+bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing, double cell);
+void bt_lattice_free(bt_lattice *l);
+/// m
+double bt_lattice_spacing(const bt_lattice *l);
+
+/// The cheapest way from the start to a node within 0.75 of the spacing from the goal (both ends of a line of points,
+/// or twice the same), under a limit of the mean force; for BT_ROUTE_PEAK that of the least largest force, which comes
+/// back in *peak, N. False when there is none.
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_found *f);
+void bt_found_free(bt_found *f);
+
+#endif

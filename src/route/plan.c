@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: MIT
+// Routes from a task; bergtow/route.h.
+#include "bergtow/route.h"
+
+#include "base/elementary.h"
+#include "route/lattice.h"
+#include "route/shorten.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MOST_STATES 2e6 ///< of a lattice whose spacing is chosen
+#define MOST_CELLS 4e6  ///< of a raster whose cells are chosen
+#define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
+enum { TRIES = 4 };
+
+// --- routes ----------------------------------------------------------------------------------------------------------
+
+/// A route of legs, and the way-points that make them.
+static void keep(const bt_planner *p, bt_route *r, int n, const bt_leg *leg, int64_t n_corners, double (*corner)[2])
+{
+    int64_t cap = bt_swath_stretches(p, n, leg);
+    *r = (bt_route){.n_corners = n_corners, .radius = p->task.radius};
+    r->stretch = bt_alloc((size_t)cap + 1, sizeof *r->stretch);
+    r->corner = bt_alloc((size_t)n_corners + 1, sizeof *r->corner);
+    memcpy(r->corner, corner, (size_t)n_corners * sizeof *corner);
+    const bt_path_cost c = bt_swath_cost(p, n, leg, r->stretch, cap, &r->n_stretches);
+    r->length = c.length, r->duration = c.time, r->work = c.work, r->peak = c.peak, r->cost = c.plain;
+    r->force = c.length > 0 ? c.work / c.length : 0;
+    r->faults = c.faults;
+    bt_swath_report(p, r);
+}
+
+static void keep_way(const bt_planner *p, bt_route *r, const bt_way *w)
+{
+    bt_path path;
+    if (!bt_way_path(p, w, &path)) return; // not those that the planner makes
+    keep(p, r, path.n - 1, path.leg, w->n, w->point);
+    bt_path_free(&path);
+}
+
+/// Way-points whose corners are the arcs of legs; arcs longer than a right angle are those of several.
+static int64_t corners_of(int n, const bt_leg *leg, double (**corner)[2])
+{
+    int64_t made = 0, cap = 2;
+    for (int k = 0; k < n; k++) cap += 2 + (int64_t)(fabs(leg[k].turn) * leg[k].length);
+    *corner = bt_alloc((size_t)cap, sizeof **corner);
+    for (int k = 0; k < n; k++) {
+        const double angle = fabs(leg[k].turn) * leg[k].length;
+        if (!(angle > 1e-9)) continue;
+        const int parts = (int)ceil(angle / (0.5 * BT_PI) - 1e-9);
+        for (int m = 0; m < parts; m++) {
+            double at[2], t[2];
+            bt_leg_at(&leg[k], m * leg[k].length / parts, at, t);
+            const double cut = bt_tan(0.5 * angle / parts) / fabs(leg[k].turn);
+            (*corner)[made][0] = at[0] + cut * t[0], (*corner)[made++][1] = at[1] + cut * t[1];
+        }
+    }
+    double t[2];
+    bt_leg_at(&leg[n - 1], leg[n - 1].length, (*corner)[made++], t);
+    return made;
+}
+
+/// Mean distance of the stretches of a from those of b, m.
+static double apart(const bt_route *a, const bt_route *b)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < a->n_stretches; i++) {
+        double least = INFINITY;
+        for (int64_t j = 0; j < b->n_stretches; j++) {
+            const bt_route_stretch *s = &b->stretch[j];
+            const double x = a->stretch[i].x - s->x, y = a->stretch[i].y - s->y;
+            const double f = bt_min(s->length, bt_max(0, x * s->tx + y * s->ty));
+            least = bt_min(least, bt_hypot(x - f * s->tx, y - f * s->ty));
+        }
+        sum += least;
+    }
+    return a->n_stretches ? sum / (double)a->n_stretches : 0;
+}
+
+/// Marks the cells within W of a route.
+static void repel(bt_planner *p, const bt_route *r)
+{
+    const bt_route_ice *g = &p->ice;
+    const double w = p->task.width / g->cell;
+    if (!p->near) p->near = bt_alloc((size_t)g->nx * (size_t)g->ny, 1);
+    for (int64_t k = 0; k < r->n_stretches; k++) {
+        const bt_route_stretch *s = &r->stretch[k];
+        const bt_leg leg = {.x = s->x, .y = s->y, .tx = s->tx, .ty = s->ty, .length = s->length, .turn = s->turn};
+        for (int part = 0; part < 8; part++) {
+            double at[2], t[2], c[2];
+            bt_leg_at(&leg, (part + 0.5) / 8 * s->length, at, t);
+            bt_route_ice_place(g, at[0], at[1], c);
+            for (int j = (int)bt_max(0, c[1] - w); j < g->ny && j <= c[1] + w; j++)
+                for (int i = (int)bt_max(0, c[0] - w); i < g->nx && i <= c[0] + w; i++) {
+                    const double x = i + 0.5 - c[0], y = j + 0.5 - c[1];
+                    if (x * x + y * y <= w * w) p->near[(int64_t)j * g->nx + i] = 1;
+                }
+        }
+    }
+}
+
+// --- what a search finds made into a route ---------------------------------------------------------------------------
+
+/// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
+/// any: the cheapest of all nodes. False when none is allowed.
+static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
+{
+    const bt_route_task *t = &p->task;
+    const double radius = t->radius > 0 ? t->radius : 1e-3 * t->width;
+    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg), *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    bt_path_cost best = {.faults = BT_ROUTE_TURNS, .cost = INFINITY};
+    int best_n = 0;
+    const bool given = !isnan(t->goal_heading), any_start = isnan(t->start_heading);
+    for (int a = 0; a < f->n_nodes; a++)
+        for (int turn = 0; turn < (a || !any_start ? 1 : t->headings); turn++)
+            for (int k = 0; k < (given ? 1 : t->headings); k++) {
+                double from[3] = {f->node[a][0], f->node[a][1], f->node[a][2]}, part[3][2], to[3];
+                if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / t->headings;
+                bt_way_goal(p, 0, from[0], from[1], to);
+                to[2] = given ? t->goal_heading : 2 * BT_PI * k / t->headings;
+                bt_route_dubins(from, to, radius, part);
+                int n = f->node_leg[a];
+                memcpy(leg, f->leg, (size_t)n * sizeof *leg);
+                bt_leg at = {.x = from[0], .y = from[1]};
+                bt_sincos(from[2], &at.ty, &at.tx);
+                for (int m = 0; m < 3; m++) {
+                    at.length = part[m][0], at.turn = part[m][1];
+                    if (!(at.length > 1e-9 * radius)) continue;
+                    leg[n++] = at;
+                    double place[2], tangent[2];
+                    bt_leg_at(&at, at.length, place, tangent);
+                    at.x = place[0], at.y = place[1], at.tx = tangent[0], at.ty = tangent[1];
+                }
+                const bt_path_cost c = bt_swath_cost(p, n, leg, NULL, 0, NULL);
+                if (!bt_swath_better(&c, &best)) continue;
+                best = c, best_n = n;
+                memcpy(best_leg, leg, (size_t)n * sizeof *leg);
+            }
+    const bool allowed = best_n > 0 && !(best.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
+    if (allowed) {
+        double(*corner)[2];
+        const int64_t n_corners = corners_of(best_n, best_leg, &corner);
+        keep(p, r, best_n, best_leg, n_corners, corner);
+        free(corner);
+    }
+    free(leg);
+    free(best_leg);
+    return allowed;
+}
+
+/// What was found, shortened; the straight line made cheaper, where that is better and direct is set.
+static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_route *r)
+{
+    const bt_route_task *t = &p->task;
+    if (!isnan(t->goal_heading)) return with_tail(p, f, r);
+    bt_way w = {0}, straight = {0};
+    w.point = bt_alloc((size_t)(w.cap = f->n_points + 16), sizeof *w.point);
+    const double *last = t->start;
+    for (int k = 0; k < f->n_points; k++) { // no two on one place
+        if (!(bt_hypot(f->point[k][0] - last[0], f->point[k][1] - last[1]) > 1e-9 * t->width)) continue;
+        w.point[w.n][0] = f->point[k][0], w.point[w.n][1] = f->point[k][1];
+        last = w.point[w.n++];
+    }
+    bt_way_price(p, &w);
+    bt_way_goal(p, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
+    bt_way_price(p, &w);
+    bt_way_shorten(p, &w);
+    if (direct && isnan(t->start_heading)) {
+        straight.point = bt_alloc((size_t)(straight.cap = 16), sizeof *straight.point);
+        straight.n = 1;
+        bt_way_goal(p, 0, t->start[0], t->start[1], straight.point[0]);
+        bt_way_price(p, &straight);
+        bt_way_shorten(p, &straight);
+        if (bt_swath_better(&straight.cost, &w.cost)) bt_way_copy(&w, &straight);
+    }
+    bool allowed = !(w.cost.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
+    if (allowed) keep_way(p, r, &w);
+    else allowed = with_tail(p, f, r);
+    free(w.point);
+    free(straight.point);
+    return allowed;
+}
+
+// --- the task --------------------------------------------------------------------------------------------------------
+
+/// The straight line as a route; false when the goal drifts away from it.
+static bool straight_line(const bt_planner *p, bt_route *r)
+{
+    const bt_route_task *t = &p->task;
+    enum { STEPS = 200 };
+    bt_way w = {.point = bt_alloc(1, sizeof *w.point), .n = 1, .cap = 1};
+    double *end = w.point[0];
+    const double wide = t->extent[2] - t->extent[0] + t->extent[3] - t->extent[1];
+    const bool still = t->drift[0] == 0 && t->drift[1] == 0;
+    bool there = false;
+    bt_way_goal(p, 0, t->start[0], t->start[1], end);
+    for (int k = 0; k < STEPS && !there; k++) {
+        bt_way_price(p, &w);
+        const double was[2] = {end[0], end[1]};
+        bt_way_goal(p, w.cost.time, t->start[0], t->start[1], end);
+        const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
+        there = still || moved < 1e-9 * t->width;
+        if (bt_hypot(end[0] - t->start[0], end[1] - t->start[1]) > 10 * wide) break;
+    }
+    if (there) {
+        keep_way(p, r, &w);
+        const double x = end[0] - t->start[0], y = end[1] - t->start[1];
+        const double given[2] = {t->start_heading, t->goal_heading};
+        for (int k = 0; k < 2; k++) {
+            if (isnan(given[k])) continue;
+            double sine, cosine;
+            bt_sincos(given[k], &sine, &cosine);
+            const double angle = bt_atan2(cosine * y - sine * x, cosine * x + sine * y);
+            if (fabs(angle) > 1e-6) r->faults |= BT_ROUTE_TURNS;
+        }
+    }
+    free(w.point);
+    return there;
+}
+
+/// Least force over the speeds on a berg in a square of W about a place, N.
+static double force_at(const bt_planner *p, const double at[2])
+{
+    const double w = p->task.width;
+    const bt_leg leg = {.x = at[0] - 0.5 * w * p->ice.ax, .y = at[1] - 0.5 * w * p->ice.ay, .tx = p->ice.ax,
+                        .ty = p->ice.ay, .length = w};
+    double load[BT_ROUTE_SPEEDS] = {0}, water[BT_ROUTE_SPEEDS], least = INFINITY;
+    bt_swath_load(p, &leg, w, load);
+    for (int s = 0; s < p->task.n_speeds; s++) {
+        water[s] = bt_swath_water(p, leg.tx, leg.ty, p->task.speed[s]);
+        least = bt_min(least, bt_max(1e-3, p->task.weight[0]) * water[s] + load[s] / w);
+    }
+    return least;
+}
+
+/// What is wrong with the start (end 0) or the goal (end 1) at this time.
+static int fault_of_end(const bt_planner *p, int end, const double at[2], double time, double *force)
+{
+    const double *u = p->task.drift, x = at[0] + u[0] * time, y = at[1] + u[1] * time, fine = 1e-9 * p->no_go.need;
+    if (bt_no_go_margin(&p->no_go, at[0], at[1]) < -fine) return BT_ROUTE_START_OUTSIDE + end;
+    if (bt_no_go_inside(&p->no_go, x, y) || bt_no_go_distance(&p->no_go, x, y) < p->no_go.need - fine)
+        return BT_ROUTE_START_NO_GO + end;
+    *force = force_at(p, at);
+    return *force * p->task.force_factor > p->task.force_limit ? BT_ROUTE_START_TOO_THICK + end : BT_ROUTE_OK;
+}
+
+static int descending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x < y) - (x > y);
+}
+
+static void begin(bt_planner *p, const bt_route_task *task)
+{
+    *p = (bt_planner){.task = *task, .penalty = 1};
+    qsort(p->task.speed, (size_t)task->n_speeds, sizeof *task->speed, descending);
+    for (int a = 0; a < 2; a++) p->water[a] = task->water[a] - task->drift[a];
+    bt_no_go_make(&p->no_go, &p->task);
+}
+
+static void end(bt_planner *p)
+{
+    bt_no_go_free(&p->no_go);
+    bt_route_ice_free(&p->ice);
+    free(p->near);
+}
+
+/// The frame: along the heading at the start where that is given, or else towards the goal, of which a point is on the
+/// lattice; and spacing and cells.
+static bt_lattice *lattice_of(bt_planner *p)
+{
+    const bt_route_task *t = &p->task;
+    const double area = (t->extent[2] - t->extent[0]) * (t->extent[3] - t->extent[1]);
+    double goal[2], ax = 1, ay = 0, h = t->spacing, cell = t->cell;
+    bt_way_goal(p, 0, t->start[0], t->start[1], goal);
+    const double x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+    if (!isnan(t->start_heading)) bt_sincos(t->start_heading, &ay, &ax);
+    else if (far > 0) ax = x / far, ay = y / far;
+    if (!(h > 0)) h = bt_max(t->width / 4, sqrt(area * t->headings / MOST_STATES));
+    if (far > h) h = far / ceil(far / h - 1e-9);
+    if (!(cell > 0)) cell = bt_max(t->width / 8, sqrt(area / MOST_CELLS));
+    return bt_lattice_make(p, ax, ay, h, h / ceil(h / cell - 1e-9));
+}
+
+void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
+{
+    bt_planner p;
+    begin(&p, task);
+    *plan = (bt_route_plan){.n = 1};
+    bt_lattice *l = lattice_of(&p);
+    const bt_route_task *t = &p.task;
+    plan->cell = p.ice.cell;
+    plan->spacing = bt_lattice_spacing(l);
+    plan->status = fault_of_end(&p, 0, t->start, 0, &plan->force);
+    if (!straight_line(&p, &plan->route[0])) {
+        plan->n = 0;
+        if (!plan->status) plan->status = BT_ROUTE_GOAL_DRIFTS;
+    }
+    const bt_route *straight = &plan->route[0];
+    double goal[4] = {0};
+    for (int a = 0; a < 4; a++) goal[a] = t->goal[t->goal_is_line ? a : a % 2] - t->drift[a % 2] * straight->duration;
+    if (!plan->status && !t->goal_is_line) plan->status = fault_of_end(&p, 1, goal, straight->duration, &plan->force);
+    bool last = plan->status != BT_ROUTE_OK;
+    int found_any = 0;
+    for (int wanted = 0; wanted < t->routes && !last; wanted++) {
+        bool kept = false;
+        p.penalty = wanted ? REPELS : 1;
+        for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
+            bt_found f;
+            double limit = t->force_limit, peak = 0;
+            bool got = true;
+            if (t->objective == BT_ROUTE_PEAK) {
+                got = bt_lattice_search(l, goal, BT_ROUTE_PEAK, limit, &peak, &f);
+                bt_found_free(&f);
+                limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
+            }
+            got = got && bt_lattice_search(l, goal, t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective, limit,
+                                           NULL, &f);
+            bt_route *r = &plan->route[plan->n];
+            if (!got || !into_route(&p, &f, wanted == 0, r)) {
+                last = true;
+                if (got) bt_found_free(&f);
+                break;
+            }
+            bt_found_free(&f);
+            found_any++;
+            kept = wanted == 0 ? apart(r, straight) > 1e-3 * t->width || fabs(r->cost - straight->cost) > 1e-6 * r->cost
+                               : true;
+            for (int a = 0; wanted > 0 && a < plan->n; a++) kept = kept && apart(r, &plan->route[a]) > t->width;
+            if (kept) plan->n++;
+            else {
+                free(r->corner);
+                free(r->stretch);
+                *r = (bt_route){0};
+            }
+            if (wanted == 0) {
+                repel(&p, straight);
+                break;
+            }
+        }
+        if (kept) repel(&p, &plan->route[plan->n - 1]);
+    }
+    if (!plan->status && !found_any) plan->status = BT_ROUTE_NONE;
+    else if (!plan->status && plan->n < 1 + t->routes) plan->status = BT_ROUTE_FEWER;
+    for (int a = 2; a < plan->n; a++) // the planned ones by cost, and of equal ones the first found first
+        for (int b = a; b > 1 && plan->route[b].cost < plan->route[b - 1].cost; b--) {
+            const bt_route swap = plan->route[b];
+            plan->route[b] = plan->route[b - 1], plan->route[b - 1] = swap;
+        }
+    plan->states = p.states;
+    bt_lattice_free(l);
+    end(&p);
+}
+
+void bt_route_straight(const bt_route_task *task, bt_route_plan *plan)
+{
+    bt_planner p;
+    begin(&p, task);
+    *plan = (bt_route_plan){.n = 1};
+    bt_lattice *l = lattice_of(&p);
+    plan->cell = p.ice.cell;
+    if (!straight_line(&p, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
+    bt_lattice_free(l);
+    end(&p);
+}
+
+void bt_route_cover(const bt_route_task *task, int64_t nx, int64_t ny, double *cover)
+{
+    const double *e = task->extent, sx = (double)nx / (e[2] - e[0]), sy = (double)ny / (e[3] - e[1]);
+    double *sums = bt_alloc((size_t)((nx + 2) * ny), sizeof *sums), *v = NULL;
+    for (int64_t i = 0; i < task->n_floes; i++) {
+        const int64_t first = task->floe_first[i], n = task->floe_first[i + 1] - first;
+        v = bt_realloc(v, (size_t)n, 2 * sizeof *v);
+        for (int64_t k = 0; k < n; k++) {
+            v[2 * k] = (task->floe[2 * (first + k)] - e[0]) * sx;
+            v[2 * k + 1] = (task->floe[2 * (first + k) + 1] - e[1]) * sy;
+        }
+        bt_route_ice_add(sums, (int)nx, (int)ny, n, v, 1);
+    }
+    bt_route_ice_sum(sums, (int)nx, (int)ny);
+    for (int64_t j = 0; j < ny; j++)
+        for (int64_t i = 0; i < nx; i++) cover[j * nx + i] = sums[j * (nx + 2) + i];
+    free(v);
+    free(sums);
+}
+
+void bt_route_free(bt_route_plan *plan)
+{
+    for (int k = 0; k < plan->n; k++) {
+        free(plan->route[k].corner);
+        free(plan->route[k].stretch);
+    }
+    *plan = (bt_route_plan){0};
+}

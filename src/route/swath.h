@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// The swath of a berg along a path: its stretches, their speeds, and what they cost.
+#ifndef BERGTOW_ROUTE_SWATH_H
+#define BERGTOW_ROUTE_SWATH_H
+
+#include "route/ice.h"
+#include "route/no_go.h"
+
+/// What all of the planner works on: task, ice and no-go polygons in one frame, and what raises the cost near routes
+/// that have been found.
+typedef struct bt_planner {
+    bt_route_task task;     ///< speeds descending
+    bt_route_ice ice;
+    bt_no_go no_go;
+    double water[2];        ///< velocity of the water in the frame of the ice, m/s
+    uint8_t *near;          ///< [ny][nx] of the raster: 1 = within W of a route found before
+    double penalty;         ///< factor of the cost there; 1 = none
+    int64_t states;
+} bt_planner;
+
+/// A stretch as it is towed.
+typedef struct bt_stretch_cost {
+    int speed;              ///< index
+    double force, work, time, measure; ///< N, J, s, in the unit of the objective
+    bool over;              ///< no speed keeps the force limit; this is the one of the least force
+} bt_stretch_cost;
+
+/// A path and what it costs.
+typedef struct bt_path_cost {
+    int faults;
+    double over;            ///< length above the force limit, m
+    double cost, second;    ///< with penalties; where costs are equal the second decides
+    double plain;           ///< without penalties
+    double length, time, work, peak;
+} bt_path_cost;
+
+/// Water drag against the tow along (tx, ty) at speed v, N. Not below a thousandth of that in still water: a current
+/// from behind does not make a way free.
+double bt_swath_water(const bt_planner *p, double tx, double ty, double v);
+
+/// Adds the integral of the load over the first `length` m of a leg, for each speed: N m. Slices between normals of
+/// the path, so that pieces that follow each other share nothing.
+void bt_swath_load(const bt_planner *p, const bt_leg *leg, double length, double *sums);
+
+/// Best speed of a stretch by the objective: load [n_speeds], N m, and mean water drag, N; limit: of the mean force.
+bt_stretch_cost bt_swath_choose(const bt_planner *p, double length, const double *load, const double *water,
+                                double limit);
+
+/// Cost of n legs. Stretches are of 2 W at most. With out, which takes cap of them, also the stretches, whose number
+/// comes back in n_out.
+bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out, int64_t cap,
+                           int64_t *n_out);
+/// Stretches that bt_swath_cost makes of these legs.
+int64_t bt_swath_stretches(const bt_planner *p, int n, const bt_leg *leg);
+
+/// Is a cheaper than b?
+bool bt_swath_better(const bt_path_cost *a, const bt_path_cost *b);
+
+/// Fill in the numbers of a route whose stretches are there: terms, areas by exact clipping, clearance.
+void bt_swath_report(const bt_planner *p, bt_route *r);
+
+#endif
