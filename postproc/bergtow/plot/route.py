@@ -19,8 +19,8 @@ def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, ro
     width = 9.0
     scale = (width - 2.0) / (right - left)
     height = np.clip(scale * (high - low), 2.5, 9.0)
-    fig = style.Figure(figsize=(width, height + 2.1))
-    axes = fig.add_axes((0.85 / width, 0.95 / (height + 2.1), (width - 2.0) / width, height / (height + 2.1)))
+    fig = style.Figure(figsize=(width, height + 1.75))
+    axes = fig.add_axes((0.85 / width, 0.95 / (height + 1.75), (width - 2.0) / width, height / (height + 1.75)))
     box = flat([(cover_extent[0], cover_extent[2]), (cover_extent[1], cover_extent[3])]).T.ravel()
     image = axes.imshow(cover.T if place.north_first else cover, origin="lower", extent=box, cmap=COVER, vmin=0,
                         vmax=1, interpolation="nearest", aspect="equal", rasterized=True)

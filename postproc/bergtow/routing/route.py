@@ -190,8 +190,8 @@ def calibrated(a, w, s, runs):
         yaw = float(np.arctan2(*(end - start)[::-1]))
         file = folder / f"s{k + 1:03d}.h5"
         floes.take(members.clear_of_hull(floes, outlines, s, start, yaw)).write(file)
-        route = planned(a, w | {"speeds": (speed,), "limit": np.inf}, s, tuple(end), planner.Weights(), 1.0,
-                        start=tuple(start), routes=1).routes[0]
+        route = planner.straight_route(s.ice, s.hull, start, end, speed=speed, extent=s.extent, cell=w["cell"],
+                                       drift=s.drift, water=s.water)
         c = tows.candidate(f"swath-{k + 1}", f"swath {k + 1}", route, speed, s)
         keys = c.keys | situation.reading(s.values, file) | {
             f"body.{name}": f"{value:.12g} {unit}" for name, value, unit in
@@ -207,7 +207,7 @@ def calibrated(a, w, s, runs):
                 continue
             forces.append(force.mean())
             ratios.append(np.percentile(force, tows.PEAK) / force.mean())
-        features.append(planner.straight_features(s.ice, s.hull, tuple(start), tuple(end), speed=speed))
+        features.append(route.features)
     if len(forces) < 6:
         raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, or "
                        "leave --calibrate out")
