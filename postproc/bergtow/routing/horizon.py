@@ -45,14 +45,16 @@ def led(route, s, speed):
     return tows.simplified(end + moved[new], tows.STRAIGHT * s.hull.width)
 
 
-def split(points, way):
-    """What of a polyline [n, 2] lies before `way` m of it, with the point there; and the unit tangent there."""
-    steps = np.diff(points, axis=0)
-    lengths = np.hypot(*steps.T)
+def with_point(points, way):
+    """A polyline [n, 2] with a point at `way` m of it: (points, its number). A tow up to there is the same, to the bit,
+    along every way that begins with these points: a leg that ended elsewhere would have another last digit."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
     passed = np.append(0.0, np.cumsum(lengths))
     k = min(int(np.searchsorted(passed, way, side="right")) - 1, len(lengths) - 1)
-    at = points[k] + steps[k] * (way - passed[k]) / lengths[k]
-    return np.vstack([points[:k + 1], at]) if way > passed[k] else points[:k + 1], steps[k] / lengths[k]
+    at = points[k] + (points[k + 1] - points[k]) * (way - passed[k]) / lengths[k]
+    if min(np.hypot(*(at - points[k])), np.hypot(*(at - points[k + 1]))) < 1e-6 * lengths[k]:
+        return points, k if way - passed[k] < lengths[k] / 2 else k + 1
+    return np.insert(points, k + 1, at, axis=0), k + 1
 
 
 def best(plan):
@@ -101,13 +103,16 @@ class Horizon:
 
     def look(self, k, time, points):
         """(ice, start, heading, decided points) at a look."""
-        s, path = self.s, self.tow(f"look-{k}", points, time)
-        decided, tangent = split(points, self.way(time))
+        s = self.s
+        points, last = with_point(points, self.way(time))
+        decided, tangent = points[:last + 1], points[last] - points[last - 1]
+        path = self.tow(f"look-{k}", points, time)
         with Run(path) as run:
             frame = run.frame_at(time - self.w["age"])
             moved = np.array(s.drift) * (time - run.frame_times[frame])
-            ice = dataclasses.replace(s.ice, outlines=[o + moved for o in run.polygons(frame)],
-                                      thickness=run.thickness)
+            outlines = run.polygons(frame)
+            ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in s.moving],
+                                      thickness=run.thickness[s.moving])
             body = np.array([run["body_x"][-1], run["body_y"][-1]])
             if s.mode == "speed":
                 start, heading = decided[-1], np.arctan2(*tangent[::-1])

@@ -182,7 +182,7 @@ def calibrated(a, w, s, runs):
     speed = w["speeds"][-1]
     length = min(max(SWATH * s.hull.width, 1.5 * speed * s.ramp), 0.6 * min(s.extent[2] - s.extent[0],
                                                                             s.extent[3] - s.extent[1]))
-    floes, folder = members.Floes.read(s.field), runs.folder / "route" / "swaths"
+    floes, folder = members.Floes.read(s.field), s.field.parent / "swaths"
     outlines = floes.outlines()
     folder.mkdir(parents=True, exist_ok=True)
     features, forces, ratios = [], [], []
@@ -326,7 +326,7 @@ def perform(a):
     goal = situation.goal(a.to, place)
     case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
     width = _above(a.width, "m", "--width") if a.width else None
-    s = situation.of(program, case, folder / "route", ramp, a.no_go, width)
+    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, width)
     w = wanted(a, s)
     if w["replan"] and s.mode == "thrust":
         raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new way "
@@ -374,7 +374,7 @@ def perform(a):
 def verify(a, w, s, goal, some, n, runs, files, found):
     """Tow every candidate through the members, and judge."""
     folder, began = files.folder, time.monotonic()
-    runs.members = members.drawn(n, s, w["errors"], folder / "route" / "members")
+    runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
     for c in some:

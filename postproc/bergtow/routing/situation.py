@@ -213,6 +213,7 @@ class Situation:
     drift: tuple          #: mean velocity of the floes, m/s
     water: tuple          #: of the water, m/s
     ramp: float           #: tow.ramp, s
+    moving: np.ndarray    #: numbers of the floes that are not fixed
 
     @property
     def mode(self):
@@ -296,7 +297,8 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
         start=tuple(map(float, start[:2])),
         extent=(x0, y0, x0 + values["domain.length"], y0 + values["domain.width"]), no_go=areas + fixed,
         drift=tuple(map(float, drift)), water=water,
-        ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"])
+        ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"],
+        moving=floes)
 
 
 def _water(values, sim):

@@ -85,7 +85,7 @@ def of(candidates, outcomes, objective):
     first = next(c for c in candidates if not c.straight)
     values = [(value(outcomes[first.name][i], objective), value(straight[i], objective)) for i in range(n)]
     out["planner_best"] = {"name": first.name, "members": n,
-                           "lost": sum(np.isfinite(b) and not a < b for a, b in values)}
+                           "lost": sum(np.isfinite(b) and not a <= b for a, b in values)}
     if n < 2:
         return out | {"code": "one_member"}
     better = shown(out["compared"][others[0].name])
