@@ -3,12 +3,14 @@
 //
 // Poses. Places are whole multiples of the spacing; headings are those of vectors of small whole numbers, 16 or 32
 // nearly even ones, so that a straight move ends on a place.
-// Moves from a heading u0: straight on; and turns by one or two headings to u1 on an arc of radius R or 2 R, as
+// Moves from a heading u0: straight on; and turns to u1 on an arc of radius R by one or two headings, of 2 R by one, as
 //     straight a − T, arc, straight b − T,   T = R tan(δ/2),   a u0 + b u1 = whole multiples of the spacing, a, b >= T
 // of which the shortest is taken: a move is a corner of a path through way-points, and the path that is found is one.
 // With R = 0 the shortest is a turn on the spot.
-// Cost. The swath of a move is a list of cells with the area that each stands for, the same at every place. Costs are
-// rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a metre times the
+// Cost. Slices of the swath, as long as the distance q <= W/4 of their places, are added up first, at every place for
+// each heading; the load of a move is the sum of such slices along it, the nearest in place and heading, the same list
+// everywhere. What is found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move,
+// without the error of half of q and of half a step of headings, but thirty times as long. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a metre times the
 // distance to the goal) down: sums do not depend on their order, and of equal costs the lower index goes first.
 #include "route/lattice.h"
 
@@ -17,7 +19,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST_HEADINGS = 32, MOST_MOVES = 9 };
+enum { MOST_HEADINGS = 32, MOST_MOVES = 7 };
 #define UNITS 1e5 ///< of cost in the least cost of a spacing
 #define THERE 0.75 ///< spacings from the goal
 
@@ -29,9 +31,9 @@ typedef struct move {
     bt_leg leg[3];           ///< in the frame of the lattice, from the origin
     double mid[2];           ///< the place halfway, m
     double water[BT_ROUTE_SPEEDS]; ///< mean water drag, N
-    int n_cells;
-    int64_t *cell;           ///< [n_cells] from the cell whose lower left corner is at the node
-    double *area;            ///< [n_cells] m²
+    int n_slices;
+    int64_t *slice;          ///< [n_slices] from that of heading 0 at the node
+    double *along;           ///< [n_slices] m
 } move;
 
 struct bt_lattice {
@@ -43,6 +45,8 @@ struct bt_lattice {
     double unit[MOST_HEADINGS][2];
     move of[MOST_HEADINGS][MOST_MOVES];
     int n_moves[MOST_HEADINGS];
+    int fine, pad, wide, high; ///< q = h/fine; places of slices beside the lattice; of slices along x and y
+    float *across;           ///< [n_headings/2][high][wide][n_speeds] mean load of a slice, N
 };
 
 // --- moves ----------------------------------------------------------------------------------------------------------
@@ -79,8 +83,8 @@ static void add_leg(move *m, double length, double turn)
     m->length += length;
 }
 
-/// A turn from heading k to k + by on arcs of this radius; false when it is the same as another one.
-static bool make_turn(const bt_lattice *l, int k, int by, double radius, move *m)
+/// A turn from heading k to k + by on an arc of this radius.
+static void make_turn(const bt_lattice *l, int k, int by, double radius, move *m)
 {
     const int to = (k + by + l->n_headings) % l->n_headings;
     const double *u = l->unit[k], *w = l->unit[to], cross = u[0] * w[1] - u[1] * w[0];
@@ -102,7 +106,6 @@ static bool make_turn(const bt_lattice *l, int k, int by, double radius, move *m
     if (radius > 0) add_leg(m, radius * fabs(angle), copysign(1 / radius, angle));
     if (!(radius > 0) && m->n_legs) m->leg[m->n_legs].tx = w[0], m->leg[m->n_legs].ty = w[1];
     add_leg(m, b_best - cut, 0);
-    return true;
 }
 
 static void make_moves(bt_lattice *l, double radius)
@@ -115,47 +118,76 @@ static void make_moves(bt_lattice *l, double radius)
         add_leg(m, l->h * sqrt((double)(v[0] * v[0] + v[1] * v[1])), 0);
         int n = 1;
         for (int by = -2; by <= 2; by++)
-            for (int wide = 1; by != 0 && wide <= (radius > 0 ? 2 : 1); wide++)
+            for (int wide = 1; by != 0 && wide <= (radius > 0 && abs(by) == 1 ? 2 : 1); wide++)
                 make_turn(l, k, by, wide * radius, &m[n++]);
         l->n_moves[k] = n;
     }
 }
 
-/// Cells of a move, by points half a cell apart or less.
-static void make_mask(const bt_lattice *l, move *m, int half)
+static void make_slices(bt_lattice *l)
+{
+    const bt_route_ice *r = &l->p->ice;
+    const int n_speeds = r->n_speeds;
+    const double w = l->p->task.width, q = l->h / l->fine;
+    const int n_across = (int)ceil(w / r->cell), n_along = (int)ceil(q / r->cell), n = n_across * n_along;
+    l->across = bt_alloc((size_t)l->wide * (size_t)l->high * (size_t)(l->n_headings / 2) * (size_t)n_speeds,
+                         sizeof *l->across);
+    double(*to)[2] = bt_alloc((size_t)n, sizeof *to); // points of a slice, in cells
+    float *out = l->across;
+    for (int k = 0; k < l->n_headings / 2; k++) {
+        const double *u = l->unit[k];
+        for (int b = 0; b < n; b++) {
+            const double along = q * ((b / n_across + 0.5) / n_along - 0.5) / r->cell;
+            const double aside = w * ((b % n_across + 0.5) / n_across - 0.5) / r->cell;
+            to[b][0] = along * u[0] - aside * u[1], to[b][1] = along * u[1] + aside * u[0];
+        }
+        for (int j = 0; j < l->high; j++)
+            for (int i = 0; i < l->wide; i++, out += n_speeds) {
+                const double x = ((l->i0 * l->fine + i - l->pad) * q - r->x0) / r->cell;
+                const double y = ((l->j0 * l->fine + j - l->pad) * q - r->y0) / r->cell;
+                for (int b = 0; b < n; b++) {
+                    const int64_t cell = (int64_t)(int)(y + to[b][1]) * r->nx + (int)(x + to[b][0]);
+                    for (int v = 0; v < n_speeds; v++) out[v] += r->load[cell * n_speeds + v];
+                }
+                for (int v = 0; v < n_speeds; v++) out[v] *= (float)(w / n);
+            }
+    }
+    free(to);
+}
+
+static int nearest_heading(const bt_lattice *l, const double t[2])
+{
+    int best = 0;
+    for (int k = 1; k < l->n_headings; k++) {
+        const double *u = l->unit[k], *b = l->unit[best];
+        if (u[0] * t[0] + u[1] * t[1] > b[0] * t[0] + b[1] * t[1]) best = k;
+    }
+    return best % (l->n_headings / 2);
+}
+
+/// Slices of a move, and what else follows from its legs.
+static void make_mask(const bt_lattice *l, move *m)
 {
     const bt_planner *p = l->p;
-    const double cell = p->ice.cell, w = p->task.width;
-    const int wide = 2 * half + 1, across = (int)ceil(2 * w / cell);
-    double *area = bt_alloc((size_t)wide * (size_t)wide, sizeof *area);
+    const double q = l->h / l->fine;
+    int cap = 0;
+    for (int g = 0; g < m->n_legs; g++) cap += (int)ceil(m->leg[g].length / q);
+    m->slice = bt_alloc((size_t)cap + 1, sizeof *m->slice);
+    m->along = bt_alloc((size_t)cap + 1, sizeof *m->along);
     double way = 0;
     for (int g = 0; g < m->n_legs; g++) {
         const bt_leg *leg = &m->leg[g];
-        const int along = (int)ceil(2 * leg->length / cell);
+        const int along = (int)ceil(leg->length / q - 1e-9);
         for (int a = 0; a < along; a++) {
             double at[2], t[2];
             bt_leg_at(leg, (a + 0.5) * leg->length / along, at, t);
-            for (int b = 0; b < across; b++) {
-                const double aside = w * ((b + 0.5) / across - 0.5);
-                const int i = half + (int)floor((at[0] - aside * t[1]) / cell);
-                const int j = half + (int)floor((at[1] + aside * t[0]) / cell);
-                area[(int64_t)j * wide + i] += leg->length / along * w / across * bt_max(0, 1 - leg->turn * aside);
-            }
+            const int64_t i = (int64_t)floor(at[0] / q + 0.5), j = (int64_t)floor(at[1] / q + 0.5);
+            m->slice[m->n_slices] = (nearest_heading(l, t) * (int64_t)l->high + j) * l->wide + i;
+            m->along[m->n_slices++] = leg->length / along;
         }
         if (way <= 0.5 * m->length) bt_leg_at(leg, bt_min(leg->length, 0.5 * m->length - way), m->mid, (double[2]){0});
         way += leg->length;
     }
-    for (int64_t c = 0; c < (int64_t)wide * wide; c++) m->n_cells += area[c] > 0;
-    m->cell = bt_alloc((size_t)m->n_cells + 1, sizeof *m->cell);
-    m->area = bt_alloc((size_t)m->n_cells + 1, sizeof *m->area);
-    int n = 0;
-    for (int j = 0; j < wide; j++)
-        for (int i = 0; i < wide; i++)
-            if (area[(int64_t)j * wide + i] > 0) {
-                m->cell[n] = (int64_t)(j - half) * p->ice.nx + (i - half);
-                m->area[n++] = area[(int64_t)j * wide + i];
-            }
-    free(area);
     for (int s = 0; s < p->task.n_speeds; s++) {
         double sum = 0;
         for (int g = 0; g < m->n_legs; g++) {
@@ -187,13 +219,19 @@ bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing,
     l->nx = (int)floor(high[0] / spacing) - l->i0 + 1, l->ny = (int)floor(high[1] / spacing) - l->j0 + 1;
     l->per_place = l->n_headings;
 
-    const int fine = (int)(spacing / cell + 0.5), half = (int)ceil((longest + t->width) / cell) + 1;
-    p->ice = (bt_route_ice){.nx = (l->nx - 1) * fine + 2 * half + 1, .ny = (l->ny - 1) * fine + 2 * half + 1,
-                            .cell = cell, .x0 = (l->i0 * fine - half) * cell, .y0 = (l->j0 * fine - half) * cell,
+    l->fine = (int)ceil(4 * spacing / t->width - 1e-9);
+    l->pad = (int)ceil(longest / spacing * l->fine) + 1;
+    l->wide = (l->nx - 1) * l->fine + 2 * l->pad + 1, l->high = (l->ny - 1) * l->fine + 2 * l->pad + 1;
+    // a whole number of cells between places, and cells under every slice
+    const int by = (int)(spacing / cell + 0.5);
+    const int half = (int)ceil((l->pad + 1) * by / (double)l->fine + t->width / cell) + 1;
+    p->ice = (bt_route_ice){.nx = (l->nx - 1) * by + 2 * half, .ny = (l->ny - 1) * by + 2 * half,
+                            .cell = cell, .x0 = (l->i0 * by - half) * cell, .y0 = (l->j0 * by - half) * cell,
                             .ax = ax, .ay = ay, .ox = t->start[0], .oy = t->start[1]};
     bt_route_ice_make(&p->ice, t);
     for (int k = 0; k < l->n_headings; k++)
-        for (int m = 0; m < l->n_moves[k]; m++) make_mask(l, &l->of[k][m], half);
+        for (int m = 0; m < l->n_moves[k]; m++) make_mask(l, &l->of[k][m]);
+    make_slices(l);
     return l;
 }
 
@@ -201,9 +239,10 @@ void bt_lattice_free(bt_lattice *l)
 {
     for (int k = 0; k < l->n_headings; k++)
         for (int m = 0; m < l->n_moves[k]; m++) {
-            free(l->of[k][m].cell);
-            free(l->of[k][m].area);
+            free(l->of[k][m].slice);
+            free(l->of[k][m].along);
         }
+    free(l->across);
     free(l);
 }
 
@@ -334,25 +373,26 @@ static int64_t price(const search *s, const move *m, int i, int j, double time, 
     const double turn = t->turn_cost * m->turned, h = l->h;
     *took = 0;
     if (!(m->length > 0)) return s->objective == BT_ROUTE_PEAK ? 0 : (int64_t)ceil(turn / s->unit);
-    const int64_t fine = (int64_t)(h / p->ice.cell + 0.5), half_x = (int64_t)(-p->ice.x0 / p->ice.cell + 0.5),
-                  half_y = (int64_t)(-p->ice.y0 / p->ice.cell + 0.5);
-    const int64_t base = (j * fine + half_y) * p->ice.nx + i * fine + half_x;
+    const int64_t base = ((j - l->j0) * (int64_t)l->fine + l->pad) * l->wide + (i - l->i0) * l->fine + l->pad;
     double load[BT_ROUTE_SPEEDS] = {0};
     if (t->n_speeds == 1) {
         double sum = 0;
-        for (int c = 0; c < m->n_cells; c++) sum += m->area[c] * p->ice.load[base + m->cell[c]];
+        for (int c = 0; c < m->n_slices; c++) sum += m->along[c] * l->across[base + m->slice[c]];
         load[0] = sum;
     } else {
-        for (int c = 0; c < m->n_cells; c++) {
-            const float *f = p->ice.load + (base + m->cell[c]) * t->n_speeds;
-            for (int v = 0; v < t->n_speeds; v++) load[v] += m->area[c] * f[v];
+        for (int c = 0; c < m->n_slices; c++) {
+            const float *f = l->across + (base + m->slice[c]) * t->n_speeds;
+            for (int v = 0; v < t->n_speeds; v++) load[v] += m->along[c] * f[v];
         }
     }
     bt_stretch_cost c = bt_swath_choose(p, m->length, load, m->water, s->limit);
     if (c.over) return -1;
     *took = c.time;
     double now = time;
-    for (int g = 0; g < m->n_legs; g++) {
+    const double mid = time + 0.5 * c.time, half = 0.5 * m->length;
+    const bt_leg middle = placed(l, &(bt_leg){.x = m->mid[0], .y = m->mid[1]}, i * h, j * h);
+    const bool clear = bt_no_go_clear(&p->no_go, middle.x, middle.y, half, mid, t->speed[c.speed]);
+    for (int g = 0; g < m->n_legs && !clear; g++) {
         const bt_leg leg = placed(l, &m->leg[g], i * h, j * h);
         if (bt_no_go_faults(&p->no_go, &leg, leg.length, now, t->speed[c.speed])) return -1;
         now += leg.length / t->speed[c.speed];

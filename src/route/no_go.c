@@ -41,7 +41,7 @@ void bt_no_go_make(bt_no_go *g, const bt_route_task *t)
             g->edge[at++] = t->no_go + 2 * k;
             g->edge[at++] = t->no_go + 2 * (k + 1 < t->no_go_first[i + 1] ? k + 1 : t->no_go_first[i]);
         }
-    g->size = bt_max(g->need, bt_max(wide, high) / 256);
+    g->size = bt_max(g->need, bt_max(wide, high) / 64);
     g->far = g->need + g->size;
     g->x0 = e[0], g->y0 = e[1];
     g->nx = (int)(wide / g->size) + 1, g->ny = (int)(high / g->size) + 1;
@@ -104,6 +104,14 @@ double bt_no_go_margin(const bt_no_go *g, double x, double y)
 {
     const double *e = g->task->extent;
     return bt_min(bt_min(x - e[0], e[2] - x), bt_min(y - e[1], e[3] - y)) - g->task->reach;
+}
+
+bool bt_no_go_clear(const bt_no_go *g, double x, double y, double half, double t, double v)
+{
+    const double *u = g->task->drift;
+    if (bt_no_go_margin(g, x, y) < half) return false;
+    return g->n == 0 ||
+           bt_no_go_distance(g, x + u[0] * t, y + u[1] * t) - g->need > half * (1 + bt_hypot(u[0], u[1]) / v);
 }
 
 static int faults_of(const bt_no_go *g, const bt_leg *leg, double s0, double s1, double t, double v, int asked)

@@ -30,6 +30,10 @@ bool bt_no_go_inside(const bt_no_go *g, double x, double y);
 /// How far the hull at (x, y), in the frame of the ice, is within the extent, m; negative: it reaches out.
 double bt_no_go_margin(const bt_no_go *g, double x, double y);
 
+/// Are all ways of `half` m to and from (x, y), passed at the time t and the speed v, free of faults? A quick look:
+/// false does not say that one is not.
+bool bt_no_go_clear(const bt_no_go *g, double x, double y, double half, double t, double v);
+
 /// Bits of bt_route.faults for the first `length` m of a leg, begun at the time t and travelled at the speed v. A curve
 /// moves by no more than its length, so that the distance in its middle clears a piece of it or the piece is halved:
 /// exact to 1e-3 of `need`, on the safe side.

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_STATES 2e6 ///< of a lattice whose spacing is chosen
-#define MOST_CELLS 4e6  ///< of a raster whose cells are chosen
+#define MOST_STATES 1.5e6 ///< of a lattice whose spacing is chosen
+#define MOST_CELLS 3e6  ///< times speeds, of a raster whose cells are chosen
 #define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
 enum { TRIES = 4 };
 
@@ -20,12 +20,13 @@ enum { TRIES = 4 };
 /// A route of legs, and the way-points that make them.
 static void keep(const bt_planner *p, bt_route *r, int n, const bt_leg *leg, int64_t n_corners, double (*corner)[2])
 {
-    int64_t cap = bt_swath_stretches(p, n, leg);
+    const int64_t cap = bt_swath_stretches(p, n, leg);
     *r = (bt_route){.n_corners = n_corners, .radius = p->task.radius};
     r->stretch = bt_alloc((size_t)cap + 1, sizeof *r->stretch);
     r->corner = bt_alloc((size_t)n_corners + 1, sizeof *r->corner);
     memcpy(r->corner, corner, (size_t)n_corners * sizeof *corner);
-    const bt_path_cost c = bt_swath_cost(p, n, leg, r->stretch, cap, &r->n_stretches);
+    const bt_path_cost c = bt_swath_cost(p, n, leg, r->stretch);
+    r->n_stretches = cap;
     r->length = c.length, r->duration = c.time, r->work = c.work, r->peak = c.peak, r->cost = c.plain;
     r->force = c.length > 0 ? c.work / c.length : 0;
     r->faults = c.faults;
@@ -133,7 +134,7 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
                     bt_leg_at(&at, at.length, place, tangent);
                     at.x = place[0], at.y = place[1], at.tx = tangent[0], at.ty = tangent[1];
                 }
-                const bt_path_cost c = bt_swath_cost(p, n, leg, NULL, 0, NULL);
+                const bt_path_cost c = bt_swath_cost(p, n, leg, NULL);
                 if (!bt_swath_better(&c, &best)) continue;
                 best = c, best_n = n;
                 memcpy(best_leg, leg, (size_t)n * sizeof *leg);
@@ -265,6 +266,7 @@ static void end(bt_planner *p)
     bt_no_go_free(&p->no_go);
     bt_route_ice_free(&p->ice);
     free(p->near);
+    free(p->kept);
 }
 
 /// The frame: along the heading at the start where that is given, or else towards the goal, of which a point is on the
@@ -280,7 +282,7 @@ static bt_lattice *lattice_of(bt_planner *p)
     else if (far > 0) ax = x / far, ay = y / far;
     if (!(h > 0)) h = bt_max(t->width / 4, sqrt(area * t->headings / MOST_STATES));
     if (far > h) h = far / ceil(far / h - 1e-9);
-    if (!(cell > 0)) cell = bt_max(t->width / 8, sqrt(area / MOST_CELLS));
+    if (!(cell > 0)) cell = bt_max(t->width / 8, sqrt(area * t->n_speeds / MOST_CELLS));
     return bt_lattice_make(p, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 
@@ -304,9 +306,10 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     if (!plan->status && !t->goal_is_line) plan->status = fault_of_end(&p, 1, goal, straight->duration, &plan->force);
     bool last = plan->status != BT_ROUTE_OK;
     int found_any = 0;
-    for (int wanted = 0; wanted < t->routes && !last; wanted++) {
+    for (int wanted = 0; plan->n < 1 + t->routes && !last; wanted++) {
         bool kept = false;
         p.penalty = wanted ? REPELS : 1;
+        bt_swath_keep(&p);
         for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
             bt_found f;
             double limit = t->force_limit, peak = 0;
@@ -341,6 +344,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
             }
         }
         if (kept) repel(&p, &plan->route[plan->n - 1]);
+        else last = last || wanted > 0;
     }
     if (!plan->status && !found_any) plan->status = BT_ROUTE_NONE;
     else if (!plan->status && plan->n < 1 + t->routes) plan->status = BT_ROUTE_FEWER;

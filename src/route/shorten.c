@@ -27,7 +27,7 @@ void bt_way_price(const bt_planner *p, bt_way *w)
         w->cost = (bt_path_cost){.faults = BT_ROUTE_TURNS, .cost = INFINITY};
         return;
     }
-    w->cost = bt_swath_cost(p, path.n - 1, path.leg, NULL, 0, NULL);
+    w->cost = bt_swath_cost(p, path.n - 1, path.leg, NULL);
     bt_path_free(&path);
 }
 

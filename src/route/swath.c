@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ACROSS = 64 }; // points of a slice, at most
+enum { ACROSS = 64, CELLS = 4 * ACROSS }; // points of a slice, at most; cells about them
 
 double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
 {
@@ -17,26 +17,31 @@ double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
     return bt_max(d * bt_hypot(x, y) * (x * tx + y * ty), 1e-3 * d * v * v);
 }
 
-/// A slice of the swath, ds long, whose middle is s m along a leg: cells (−1 outside of the raster), and the areas that
-/// they stand for, m². On the inner side of a turn sharper than W/2 a slice ends at its centre. Returns their number.
-static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[ACROSS], double area[ACROSS])
+/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m². Between
+/// the middles of cells it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a turn
+/// sharper than W/2 a slice ends at its centre. Returns the number of cells.
+static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[CELLS], double area[CELLS])
 {
     const bt_route_ice *r = &p->ice;
     const double w = p->task.width, inv = 1 / r->cell;
-    int n = (int)ceil(w * inv - 1e-9);
+    int n = (int)ceil(w * inv - 1e-9), made = 0;
     n = n < 1 ? 1 : n > ACROSS ? ACROSS : n;
     double place[2], tangent[2], at[2];
     bt_leg_at(leg, s, place, tangent);
     bt_route_ice_place(r, place[0], place[1], at);
     const double t[2] = {tangent[0] * r->ax + tangent[1] * r->ay, tangent[1] * r->ax - tangent[0] * r->ay};
     for (int k = 0; k < n; k++) {
-        const double aside = w * ((k + 0.5) / n - 0.5);
-        const double x = at[0] - aside * inv * t[1], y = at[1] + aside * inv * t[0];
-        const bool in = x >= 0 && y >= 0 && x < r->nx && y < r->ny;
-        cell[k] = in ? (int64_t)(int)y * r->nx + (int)x : -1;
-        area[k] = ds * w / n * bt_max(0, 1 - leg->turn * aside);
+        const double aside = w * ((k + 0.5) / n - 0.5), here = ds * w / n * bt_max(0, 1 - leg->turn * aside);
+        const double x = at[0] - aside * inv * t[1] - 0.5, y = at[1] + aside * inv * t[0] - 0.5;
+        if (!(x >= 0 && y >= 0 && x < r->nx - 1 && y < r->ny - 1)) continue;
+        const int64_t i = (int64_t)x, j = (int64_t)y, c = j * r->nx + i;
+        const double fx = x - (double)i, fy = y - (double)j;
+        cell[made] = c, area[made++] = here * (1 - fx) * (1 - fy);
+        cell[made] = c + 1, area[made++] = here * fx * (1 - fy);
+        cell[made] = c + r->nx, area[made++] = here * (1 - fx) * fy;
+        cell[made] = c + r->nx + 1, area[made++] = here * fx * fy;
     }
-    return n;
+    return made;
 }
 
 static int slices(const bt_planner *p, double length)
@@ -47,12 +52,11 @@ static int slices(const bt_planner *p, double length)
 void bt_swath_load(const bt_planner *p, const bt_leg *leg, double length, double *sums)
 {
     const int n = slices(p, length), n_speeds = p->ice.n_speeds;
-    int64_t cell[ACROSS];
-    double area[ACROSS];
+    int64_t cell[CELLS];
+    double area[CELLS];
     for (int k = 0; k < n; k++) {
         const int across = slice(p, leg, (k + 0.5) * length / n, length / n, cell, area);
         for (int a = 0; a < across; a++) {
-            if (cell[a] < 0) continue;
             const float *load = p->ice.load + cell[a] * n_speeds;
             for (int v = 0; v < n_speeds; v++) sums[v] += area[a] * load[v];
         }
@@ -102,11 +106,76 @@ static bool is_near(const bt_planner *p, double x, double y)
            p->near[(int64_t)(int)at[1] * r->nx + (int)at[0]];
 }
 
-bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out, int64_t cap,
-                           int64_t *n_out)
+/// The stretches of a leg that begins at the time t.
+static bt_path_cost leg_cost(const bt_planner *p, const bt_leg *leg, double t, bt_route_stretch *out)
 {
     bt_path_cost c = {0};
-    int64_t made = 0;
+    const int64_t parts = parts_of(p, leg);
+    const bool peak = p->task.objective == BT_ROUTE_PEAK;
+    for (int64_t m = 0; m < parts; m++) {
+        const double length = leg->length / (double)parts;
+        double at[2], tan[2], mid[2], t_mid[2], load[BT_ROUTE_SPEEDS] = {0}, water[BT_ROUTE_SPEEDS];
+        bt_leg_at(leg, (double)m * length, at, tan);
+        bt_leg_at(leg, ((double)m + 0.5) * length, mid, t_mid);
+        const bt_leg part = {.x = at[0], .y = at[1], .tx = tan[0], .ty = tan[1], .length = length, .turn = leg->turn};
+        bt_swath_load(p, &part, length, load);
+        for (int v = 0; v < p->task.n_speeds; v++)
+            water[v] = bt_swath_water(p, t_mid[0], t_mid[1], p->task.speed[v]);
+        const bt_stretch_cost s = bt_swath_choose(p, length, load, water, p->task.force_limit);
+        const double factor = is_near(p, mid[0], mid[1]) ? p->penalty : 1;
+        const double plain = s.measure + p->task.turn_cost * fabs(part.turn) * length;
+        c.faults |= bt_no_go_faults(&p->no_go, &part, length, t + c.time, p->task.speed[s.speed]);
+        if (s.over) c.over += length, c.faults |= BT_ROUTE_OVER_LIMIT;
+        c.cost = peak ? bt_max(c.cost, factor * plain) : c.cost + factor * plain;
+        c.plain = peak ? bt_max(c.plain, plain) : c.plain + plain;
+        c.second += factor * s.work;
+        c.length += length;
+        c.time += s.time;
+        c.work += s.work;
+        c.peak = bt_max(c.peak, s.force);
+        if (out)
+            out[m] = (bt_route_stretch){.x = at[0], .y = at[1], .tx = tan[0], .ty = tan[1], .length = length,
+                                        .turn = part.turn, .speed = p->task.speed[s.speed], .force = s.force};
+    }
+    return c;
+}
+
+/// What a leg costs, kept: a step of the shortening leaves most legs as they are. Where no-go polygons move in the frame
+/// of the ice nothing is kept.
+typedef struct bt_kept_leg {
+    double x, y, tx, ty, length, turn, penalty;
+    bt_path_cost cost;
+} bt_kept_leg;
+
+enum { KEPT = 4096 };
+
+static bt_path_cost kept_cost(const bt_planner *p, const bt_leg *leg, double t)
+{
+    if (p->task.drift[0] != 0 || p->task.drift[1] != 0 || !p->kept) return leg_cost(p, leg, t, NULL);
+    const double key[7] = {leg->x, leg->y, leg->tx, leg->ty, leg->length, leg->turn, p->penalty};
+    uint64_t hash = 0, bits;
+    for (int k = 0; k < 7; k++) {
+        memcpy(&bits, &key[k], sizeof bits);
+        hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+        hash ^= hash >> 29;
+    }
+    bt_kept_leg *kept = &p->kept[hash % KEPT];
+    if (memcmp(&kept->x, key, sizeof key) != 0 || !(kept->cost.length > 0)) {
+        memcpy(&kept->x, key, sizeof key);
+        kept->cost = leg_cost(p, leg, t, NULL);
+    }
+    return kept->cost;
+}
+
+void bt_swath_keep(bt_planner *p)
+{
+    free(p->kept);
+    p->kept = bt_alloc(KEPT, sizeof *p->kept);
+}
+
+bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out)
+{
+    bt_path_cost c = {0};
     for (int k = 0; k < n; k++) {
         if (k > 0 && p->task.turn_cost > 0) { // at a sharp corner
             double at[2], t[2];
@@ -115,37 +184,15 @@ bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_rou
             const double turn = p->task.objective == BT_ROUTE_PEAK ? 0 : p->task.turn_cost * fabs(angle);
             c.cost += turn, c.plain += turn;
         }
-        const int64_t parts = parts_of(p, &leg[k]);
-        for (int64_t m = 0; m < parts; m++) {
-            const double length = leg[k].length / (double)parts;
-            double at[2], t[2], mid[2], t_mid[2], load[BT_ROUTE_SPEEDS] = {0}, water[BT_ROUTE_SPEEDS];
-            bt_leg_at(&leg[k], (double)m * length, at, t);
-            bt_leg_at(&leg[k], ((double)m + 0.5) * length, mid, t_mid);
-            const bt_leg part = {.x = at[0], .y = at[1], .tx = t[0], .ty = t[1], .length = length, .turn = leg[k].turn};
-            bt_swath_load(p, &part, length, load);
-            for (int v = 0; v < p->task.n_speeds; v++)
-                water[v] = bt_swath_water(p, t_mid[0], t_mid[1], p->task.speed[v]);
-            const bt_stretch_cost s = bt_swath_choose(p, length, load, water, p->task.force_limit);
-            const double factor = is_near(p, mid[0], mid[1]) ? p->penalty : 1;
-            c.faults |= bt_no_go_faults(&p->no_go, &part, length, c.time, p->task.speed[s.speed]);
-            if (s.over) c.over += length, c.faults |= BT_ROUTE_OVER_LIMIT;
-            const double turn = p->task.turn_cost * fabs(part.turn) * length;
-            c.cost = p->task.objective == BT_ROUTE_PEAK ? bt_max(c.cost, factor * (s.measure + turn))
-                                                        : c.cost + factor * (s.measure + turn);
-            c.plain = p->task.objective == BT_ROUTE_PEAK ? bt_max(c.plain, s.measure + turn)
-                                                         : c.plain + s.measure + turn;
-            c.second += factor * s.work;
-            c.length += length;
-            c.time += s.time;
-            c.work += s.work;
-            c.peak = bt_max(c.peak, s.force);
-            if (out && made < cap)
-                out[made] = (bt_route_stretch){.x = at[0], .y = at[1], .tx = t[0], .ty = t[1], .length = length,
-                                               .turn = part.turn, .speed = p->task.speed[s.speed], .force = s.force};
-            made++;
-        }
+        const bt_path_cost l = out ? leg_cost(p, &leg[k], c.time, out) : kept_cost(p, &leg[k], c.time);
+        if (out) out += parts_of(p, &leg[k]);
+        const bool peak = p->task.objective == BT_ROUTE_PEAK;
+        c.cost = peak ? bt_max(c.cost, l.cost) : c.cost + l.cost;
+        c.plain = peak ? bt_max(c.plain, l.plain) : c.plain + l.plain;
+        c.faults |= l.faults;
+        c.over += l.over, c.second += l.second, c.length += l.length, c.time += l.time, c.work += l.work;
+        c.peak = bt_max(c.peak, l.peak);
     }
-    if (n_out) *n_out = made;
     return c;
 }
 
@@ -264,12 +311,11 @@ void bt_swath_report(const bt_planner *p, bt_route *r)
         const bt_leg leg = {.x = o->x, .y = o->y, .tx = o->tx, .ty = o->ty, .length = o->length, .turn = o->turn};
         const int n = slices(p, o->length);
         for (int k = 0; k < n; k++) {
-            int64_t cell[ACROSS];
-            double area[ACROSS], at[2], tan[2], term[BT_ROUTE_TERMS];
+            int64_t cell[CELLS];
+            double area[CELLS], at[2], tan[2], term[BT_ROUTE_TERMS];
             const double way = (k + 0.5) * o->length / n;
             const int across = slice(p, &leg, way, o->length / n, cell, area);
             for (int a = 0; a < across; a++) {
-                if (cell[a] < 0) continue;
                 bt_route_ice_terms(&p->ice, &p->task, cell[a], o->speed, term);
                 for (int m = 1; m < BT_ROUTE_TERMS; m++) r->term[m] += area[a] * term[m] / r->length;
             }

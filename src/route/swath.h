@@ -15,6 +15,7 @@ typedef struct bt_planner {
     double water[2];        ///< velocity of the water in the frame of the ice, m/s
     uint8_t *near;          ///< [ny][nx] of the raster: 1 = within W of a route found before
     double penalty;         ///< factor of the cost there; 1 = none
+    struct bt_kept_leg *kept; ///< by bt_swath_keep
     int64_t states;
 } bt_planner;
 
@@ -46,10 +47,10 @@ void bt_swath_load(const bt_planner *p, const bt_leg *leg, double length, double
 bt_stretch_cost bt_swath_choose(const bt_planner *p, double length, const double *load, const double *water,
                                 double limit);
 
-/// Cost of n legs. Stretches are of 2 W at most. With out, which takes cap of them, also the stretches, whose number
-/// comes back in n_out.
-bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out, int64_t cap,
-                           int64_t *n_out);
+/// Cost of n legs. Stretches are of 2 W at most; out, or NULL, takes them: bt_swath_stretches.
+bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out);
+/// From here on bt_swath_cost keeps what legs cost; called again when the penalty's cells have changed.
+void bt_swath_keep(bt_planner *p);
 /// Stretches that bt_swath_cost makes of these legs.
 int64_t bt_swath_stretches(const bt_planner *p, int n, const bt_leg *leg);
 
