@@ -27,7 +27,7 @@ from .case import Case, quantities
 from .errors import BergtowError, CaseError
 from .force import Bodies, Force
 from .functions import (Outlines, Picture, budget, capability, converge, design, outlines, plot_chains, plot_ensemble,
-                        plot_field, plot_force, plot_impacts, plot_resistance, report, statistics)
+                        plot_field, plot_force, plot_impacts, plot_resistance, report, route, statistics)
 from .result.dataset import Result, open_result
 from .simulation import Simulation, run
 from .study.ensemble import Ensemble
@@ -36,4 +36,4 @@ __version__ = "0.1.0"
 __all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Force", "Outlines", "Picture", "Result",
            "Simulation", "budget", "capability", "converge", "design", "library_path", "open_result", "outlines",
            "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
-           "report", "run", "start_mpi", "statistics"]
+           "report", "route", "run", "start_mpi", "statistics"]

@@ -16,6 +16,7 @@ import pytest
 
 from harness import BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed, environment, run, script, write_case
 
+import bergtow
 from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, members, situation, tows, verdict
@@ -400,6 +401,15 @@ def test_a_new_look_leaves_the_way_so_far(tmp_path):
     for early, late in zip(series, series[1:]):
         assert np.array_equal(early, late[:len(early)])
     assert all(t["arrived"] for t in found["horizon"]["tows"].values())
+
+
+def test_the_function_is_the_command(routed, tmp_path):
+    found = bergtow.route(routed.folder / "case.yml", tmp_path / "out", to=(8.5, 0.3), from_=(2.5, 0), routes=2,
+                          plan_only=True, speeds=[0.13])
+    for mine, theirs in zip(found["routes"], routed.found["routes"]):
+        assert mine["waypoints"] == theirs["waypoints"] and mine["predicted"] == theirs["predicted"]
+    line = bergtow.route(routed.folder / "case.yml", tmp_path / "line", to=((8.5, -0.5), (8.5, 0.5)), plan_only=True)
+    assert line["goal"] == [[8.5, -0.5], [8.5, 0.5]] and line["routes"][0]["predicted"]["length"] <= 6.0001
 
 
 # ---- wrong use

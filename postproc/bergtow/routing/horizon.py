@@ -177,9 +177,8 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
     by_name["straight"]["simulated"] = command.means([found["horizon"]["tows"]["straight"]])
     c = tows.Candidate("horizon", "with new looks", route or first.routes[0], h.speed, h.keys(
         points, h.duration(points)), points, None, points[1:])
-    output.case(c, files.folder / "case.yml", files.folder / "horizon.yml", a.force)
+    output.case(c, files.folder / "route-base.yml", files.folder / "horizon.yml", a.force)
     files.write(found, picture=True)
     told = writing.plain(found)
     print(words.rounds(told))
-    command.page(found, [("with new looks", some["horizon"]), ("straight line", some["straight"])], files.folder,
-                 a.force)
+    command.page(a, found, [("with new looks", some["horizon"]), ("straight line", some["straight"])], files.folder)

@@ -11,7 +11,6 @@ stopped: tows are those of study/runs.py.
 """
 import base64
 import json
-import sys
 import time
 from pathlib import Path
 
@@ -34,7 +33,7 @@ POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
 RADIUS = 2.0             # hull widths: least radius of a body whose speed is prescribed
 RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
 SWATH = 15.0             # hull widths: least length of a swath of --calibrate
-FILES = ("case.yml", "routes.geojson", "routes.gpx", "route.json", "route.png", "route.html")
+FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "route.json", "route.png", "route.html")
 
 #: status of a plan without routes: (what is named, why, remedy)
 STATUS = {
@@ -93,6 +92,7 @@ def options(p):
     p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in the "
                    "unit of the objective (default 0)")
     p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
+    p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
                    "the same call goes on")
     analysis.add_options(p, BUDGET)
@@ -296,7 +296,7 @@ class Files:
 
     def write_plan(self):
         for c in self.some:
-            output.case(c, self.folder / "case.yml", self.folder / f"{c.name}.yml", self.force)
+            output.case(c, self.folder / "route-base.yml", self.folder / f"{c.name}.yml", self.force)
         if self.s.place.origin is not None:
             output.gpx(self.some, self.s.place, self.folder / "routes.gpx", self.force)
 
@@ -353,8 +353,8 @@ def perform(a):
         files.write(found, picture=True)
         print(words.plan(writing.plain(found)))
         if plan.status == "fewer_routes":
-            print(f"bergtow route: warning: {sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were "
-                  "found that lie a width apart", file=sys.stderr)
+            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one lies a "
+                  "width apart from these.")
         n = 1 if w["errors"].none else a.members
         seconds = estimate(program, s, some, n, a.jobs)
         found["estimate_s"] = seconds
@@ -401,12 +401,15 @@ def verify(a, w, s, goal, some, n, runs, files, found):
     v = found["verdict"]
     shown = [(by_name[name]["label"], runs.path(name, 0)) for name in
              dict.fromkeys(x for x in (v["recommended"] or v["chosen"], v["straight"]) if x)]
-    page(found, shown, folder, a.force)
+    page(a, found, shown, folder)
 
 
-def page(found, shown, folder, force):
+def page(a, found, shown, folder):
+    """The page with two tows beside each other: [(heading, folder of the tow)]."""
+    print(folder / "route.json")
+    if a.no_page:
+        return
     from bergtow.reporting import side_by_side
     picture = base64.b64encode((folder / "route.png").read_bytes()).decode("ascii")
     told = writing.plain(found)
-    side_by_side.write(f"{told['title']}: routes", words.text(told), picture, shown, folder / "route.html", force)
-    print(folder / "route.json")
+    side_by_side.write(f"{told['title']}: routes", words.text(told), picture, shown, folder / "route.html", a.force)

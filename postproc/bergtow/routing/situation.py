@@ -136,7 +136,7 @@ def no_go_file(path, place):
 
 
 def own_case(path, sets, values, folder, map_file=None, force=False):
-    """Write FOLDER/case.yml: the case with the files that it is based on in one, and without the keys that a route
+    """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a route
     says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the user says
     of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
     merged = {}
@@ -156,7 +156,8 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
         if not map_file.is_file():
             raise RunError(map_file, "no such file", "name a field (.h5) or outlines (.geojson) with --map")
         given.append((f"ice.{kind}", str(map_file.resolve())))
-        merged["ice"] = {k: v for k, v in merged.get("ice", {}).items() if k not in MADE}  # no effect beside a map
+        idle = MADE + (BESIDE_FIELD if kind == "field" else ())
+        merged["ice"] = {k: v for k, v in merged.get("ice", {}).items() if k not in idle}
     for key, value in [*given, *values.items()]:
         node, (*parents, last) = merged, key.strip().split(".")
         for name in parents:
@@ -166,7 +167,7 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     ramp = merged.get("tow", {}).get("ramp")
     for key in OWN:
         merged.get("tow", {}).pop(key, None)
-    out = folder / "case.yml"
+    out = folder / "route-base.yml"
     text = f"# {path.name} without the way of the tow, which each route says; {writing.MARK}\n"
     writing.write_text(text + json.dumps(merged, indent=1, ensure_ascii=False) + "\n", out, force)
     return out, ramp
@@ -175,6 +176,8 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
 #: keys of the ice that have no effect where it is read
 MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
         "size_exponent", "shake", "extent", "seed")
+#: beside a field, too
+BESIDE_FIELD = ("thickness", "thickness_law", "thickness_spread", "x_min", "x_max", "y_min", "y_max", "outlines_crs")
 
 
 def _merged(old, new):
@@ -199,7 +202,7 @@ def _rebased(node, folder):
 class Situation:
     """A case before its tow."""
 
-    case: Path            #: case.yml, without the way of the tow
+    case: Path            #: route-base.yml, without the way of the tow
     field: Path           #: the floes, as `bergtow field` has written them
     values: Case          #: every key
     place: Place
