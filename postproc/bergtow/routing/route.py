@@ -30,7 +30,9 @@ BUDGET = 60.0            # min
 ROUTES, MEMBERS = 3, 10
 #: errors of a map where none are said, assumed: of the hull's width, of the thickness, of the speed of the tow
 POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
-RADIUS = 2.0             # hull widths: least radius of a body whose speed is prescribed
+#: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line and
+#: so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards by 27°
+RADIUS, LENGTHS = 2.0, 2.0
 RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
 SWATH = 15.0             # hull widths: least length of a swath of --calibrate
 FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "route.json", "route.png", "route.html")
@@ -85,8 +87,8 @@ def options(p):
     p.add_argument("--replan", metavar="S", help="look at the ice anew after every S of the tow and plan the rest")
     p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default 0 s)")
     p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
-    p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line; "
-                   f"without one {RADIUS:g} widths)")
+    p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
+                   f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
     p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
     p.add_argument("--cell", metavar="M", help="of the raster of costs (default: an eighth of the width, or more)")
     p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in the "
@@ -128,7 +130,8 @@ def wanted(a, s):
     return {"speeds": tuple(speeds), "errors": errors,
             "assumed": a.map_error is None or a.drift_error is None or a.thickness_error == THICKNESS,
             "limit": _above(a.force_limit, "N", "--force-limit") if a.force_limit else np.inf,
-            "radius": _not_below(a.radius, "m", "--radius") if a.radius else s.line or RADIUS * s.hull.width,
+            "radius": _not_below(a.radius, "m", "--radius") if a.radius else
+            max(s.line, LENGTHS * s.mass / s.hull.drag) if s.line else RADIUS * s.hull.width,
             "clearance": _not_below(a.clearance, "m", "--clearance"),
             "cell": _above(a.cell, "m", "--cell") if a.cell else None,
             "replan": _above(a.replan, "s", "--replan") if a.replan else None,

@@ -273,7 +273,7 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     checked(values)
     place = _place(values)
     areas = [polygon for file in no_go for polygon in no_go_file(file, place)]
-    field_file = field(program, case, folder)
+    field_file = Path(case.parent, values["ice.field"]) if values["ice.field"] else field(program, case, folder)
     with Simulation(Case(case, reading(values, field_file)), threads=1) as sim:
         body, motion, ice = sim.towed, sim.motions, sim.thicknesses > 0
         outlines = [sim.outline(i) for i in range(sim.n_bodies)]

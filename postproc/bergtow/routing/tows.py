@@ -5,7 +5,7 @@ A route is a case of its own: the way of the body (tow.mode speed) or of the tow
 run.duration. In a steady turn the line bears the drag F along the way and the centripetal force across it, so that it
 leads inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m that added mass is part of and the
 curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end goes where that puts it, at body + L (cos(delta) t +
-sin(delta) n): of a light body the inverse of the tractrix. kappa is averaged over the length of the line, for a body
+sin(delta) n): of a light body the inverse of the tractrix. kappa is smoothed over the length of the line, for a body
 cannot follow a jump of it; what the tow makes of that the simulation shows. Rejected: the tractrix alone, with which
 an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
 
@@ -94,8 +94,14 @@ def tug_track(route, situation):
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     new = np.append(True, np.diff(way) > 1e-9 * way[-1])
     way, x, y, heading = way[new], route.x[new], route.y[new], np.unwrap(route.heading)[new]
-    # the mean of the curvature over a line's length is the turn within it
-    turn = np.interp(way + s.line / 2, way, heading) - np.interp(way - s.line / 2, way, heading)
+    # curvature averaged over two lengths of the line with the weights of a triangle: a difference of means of the heading
+    area = np.append(0.0, np.cumsum(np.diff(way) * (heading[1:] + heading[:-1]) / 2))
+
+    def whole(at):  # of the heading, which goes on as it begins and ends
+        inside = np.clip(at, 0, way[-1])
+        return (np.interp(inside, way, area) + np.minimum(at, 0) * heading[0] +
+                np.maximum(at - way[-1], 0) * heading[-1])
+    turn = (whole(way + s.line) - 2 * whole(way) + whole(way - s.line)) / s.line
     force = max(route.force, s.hull.drag * route.length ** 2 / route.duration ** 2)
     speed = route.length / route.duration
     delta = np.arctan(s.mass * (turn / s.line) * speed ** 2 / force) if s.line > 0 else 0.0 * way
