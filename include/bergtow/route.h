@@ -9,7 +9,8 @@
 //     water       d |V t − u_w| (V t − u_w) · t, d = ½ ρ_w C_d A_w, u_w the water's velocity in this frame: one number
 //     plough      f1 = (1 + C) m V²: floes that the berg meets are taken up to its speed; as much again is lost
 //     compaction  f1 (1/(1 − c'/c_j) − 1): ahead of the berg ice is packed up to the cover c_j at which it jams, and
-//                 the front of that runs ahead of the berg; momentum of a piston in one dimension, an upper bound in two
+//                 the front of that runs ahead of the berg; momentum of a piston in one dimension, an upper bound in
+//                 two; 1/(..) is at most 10, assumed
 //     large       f1 (D/W − 1) where floes are wider than the berg, of diameter D, since they move as a whole
 //     rafting     q h² c, q = κ ½ ρ_i (1 − ρ_i/ρ_w) g, 1 wherever ice is met; of weight 0 unless it is fitted
 // Where floes raft, the sum of plough, compaction and large is at most q (h²)' [the cap of contacts that raft]. Which

@@ -39,12 +39,12 @@ double bt_route_word(const double from[3], const double to[3], double radius, in
         last = heading;
     } else {
         if (far > 4) return INFINITY;
-        // isosceles triangle of the three centres: sides 2, 2, far; the middle one lies to the right of the way from
-        // the first to the last for LRL, to its left for RLR, which makes the middle arc the longer one
+        // isosceles triangle of the three centres: sides 2, 2, far; the middle one lies to the left of the way from
+        // the first to the last for LRL, to its right for RLR, which makes the middle arc more than half a circle
         const double cosine = far / 4, angle = bt_atan2(sqrt(bt_max(0, 1 - cosine * cosine)), cosine);
-        const double to_middle = way - w[0] * angle; // direction from the first centre to the middle one
+        const double to_middle = way + w[0] * angle; // direction from the first centre to the middle one
         heading = to_middle + w[0] * 0.5 * BT_PI;
-        const double from_middle = way + w[0] * angle + BT_PI; // from the last centre to the middle one
+        const double from_middle = way - w[0] * angle + BT_PI; // from the last centre to the middle one
         last = from_middle + w[2] * 0.5 * BT_PI;
         middle = turn_of(w[1] * (last - heading));
     }

@@ -32,7 +32,8 @@ void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t);
 void bt_route_ice_free(bt_route_ice *r);
 
 /// Terms of the force per metre of width of cell k at speed v, unweighted; water stays 0.
-void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v, double term[BT_ROUTE_TERMS]);
+void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v,
+                        double term[BT_ROUTE_TERMS]);
 
 /// Adds weight × area of a polygon of n points [n][2], in cells, to sums [ny][nx + 2], which bt_route_ice_sum ends.
 void bt_route_ice_add(double *sums, int nx, int ny, int64_t n, const double *v, double weight);

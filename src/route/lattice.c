@@ -10,8 +10,10 @@
 // Cost. Slices of the swath, as long as the distance q <= W/4 of their places, are added up first, at every place for
 // each heading; the load of a move is the sum of such slices along it, the nearest in place and heading, the same list
 // everywhere. What is found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move,
-// without the error of half of q and of half a step of headings, but thirty times as long. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a metre times the
-// distance to the goal) down: sums do not depend on their order, and of equal costs the lower index goes first.
+// without the error of half of q and of half a step of headings, but thirty times as long.
+// Order. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a
+// metre times the distance to the goal) down: sums do not depend on their order, and of equal costs the lower index
+// goes first.
 #include "route/lattice.h"
 
 #include "base/elementary.h"
@@ -46,7 +48,7 @@ struct bt_lattice {
     move of[MOST_HEADINGS][MOST_MOVES];
     int n_moves[MOST_HEADINGS];
     int fine, pad, wide, high; ///< q = h/fine; places of slices beside the lattice; of slices along x and y
-    float *across;           ///< [n_headings/2][high][wide][n_speeds] mean load of a slice, N
+    float *across;           ///< [high][wide][n_headings/2][n_speeds] mean load of a slice, N: one cache line a place
 };
 
 // --- moves ----------------------------------------------------------------------------------------------------------
@@ -133,7 +135,6 @@ static void make_slices(bt_lattice *l)
     l->across = bt_alloc((size_t)l->wide * (size_t)l->high * (size_t)(l->n_headings / 2) * (size_t)n_speeds,
                          sizeof *l->across);
     double(*to)[2] = bt_alloc((size_t)n, sizeof *to); // points of a slice, in cells
-    float *out = l->across;
     for (int k = 0; k < l->n_headings / 2; k++) {
         const double *u = l->unit[k];
         for (int b = 0; b < n; b++) {
@@ -142,7 +143,8 @@ static void make_slices(bt_lattice *l)
             to[b][0] = along * u[0] - aside * u[1], to[b][1] = along * u[1] + aside * u[0];
         }
         for (int j = 0; j < l->high; j++)
-            for (int i = 0; i < l->wide; i++, out += n_speeds) {
+            for (int i = 0; i < l->wide; i++) {
+                float *out = l->across + (((int64_t)j * l->wide + i) * (l->n_headings / 2) + k) * n_speeds;
                 const double x = ((l->i0 * l->fine + i - l->pad) * q - r->x0) / r->cell;
                 const double y = ((l->j0 * l->fine + j - l->pad) * q - r->y0) / r->cell;
                 for (int b = 0; b < n; b++) {
@@ -182,7 +184,7 @@ static void make_mask(const bt_lattice *l, move *m)
             double at[2], t[2];
             bt_leg_at(leg, (a + 0.5) * leg->length / along, at, t);
             const int64_t i = (int64_t)floor(at[0] / q + 0.5), j = (int64_t)floor(at[1] / q + 0.5);
-            m->slice[m->n_slices] = (nearest_heading(l, t) * (int64_t)l->high + j) * l->wide + i;
+            m->slice[m->n_slices] = (j * l->wide + i) * (l->n_headings / 2) + nearest_heading(l, t);
             m->along[m->n_slices++] = leg->length / along;
         }
         if (way <= 0.5 * m->length) bt_leg_at(leg, bt_min(leg->length, 0.5 * m->length - way), m->mid, (double[2]){0});
@@ -251,7 +253,7 @@ double bt_lattice_spacing(const bt_lattice *l)
     return l->h;
 }
 
-// --- the open list ---------------------------------------------------------------------------------------------------
+// --- the open list: a heap of four children each, for the sake of the cache -----------------------------------------
 
 typedef struct entry {
     int64_t bound;
@@ -272,7 +274,7 @@ static void push(heap *q, entry e)
 {
     if (q->n == q->cap) q->e = bt_realloc(q->e, q->cap = q->cap ? 2 * q->cap : 1024, sizeof *q->e);
     size_t k = q->n++;
-    for (; k > 0 && before(e, q->e[(k - 1) / 2]); k = (k - 1) / 2) q->e[k] = q->e[(k - 1) / 2];
+    for (; k > 0 && before(e, q->e[(k - 1) / 4]); k = (k - 1) / 4) q->e[k] = q->e[(k - 1) / 4];
     q->e[k] = e;
 }
 
@@ -280,8 +282,10 @@ static entry pop(heap *q)
 {
     const entry top = q->e[0], last = q->e[--q->n];
     size_t k = 0;
-    for (size_t child; (child = 2 * k + 1) < q->n; k = child) {
-        if (child + 1 < q->n && before(q->e[child + 1], q->e[child])) child++;
+    for (size_t child; (child = 4 * k + 1) < q->n; k = child) {
+        const size_t end = child + 4 < q->n ? child + 4 : q->n;
+        for (size_t other = child + 1; other < end; other++)
+            if (before(q->e[other], q->e[child])) child = other;
         if (!before(q->e[child], last)) break;
         q->e[k] = q->e[child];
     }
@@ -373,7 +377,8 @@ static int64_t price(const search *s, const move *m, int i, int j, double time, 
     const double turn = t->turn_cost * m->turned, h = l->h;
     *took = 0;
     if (!(m->length > 0)) return s->objective == BT_ROUTE_PEAK ? 0 : (int64_t)ceil(turn / s->unit);
-    const int64_t base = ((j - l->j0) * (int64_t)l->fine + l->pad) * l->wide + (i - l->i0) * l->fine + l->pad;
+    const int64_t place = ((j - l->j0) * (int64_t)l->fine + l->pad) * l->wide + (i - l->i0) * l->fine + l->pad;
+    const int64_t base = place * (l->n_headings / 2);
     double load[BT_ROUTE_SPEEDS] = {0};
     if (t->n_speeds == 1) {
         double sum = 0;
@@ -437,7 +442,7 @@ static void split(const bt_lattice *l, int32_t state, int *i, int *j, int *k)
 }
 
 /// The moves that led to a state, as legs and way-points.
-static void follow(const search *s, int32_t last, bt_found *f)
+static void follow(const search *s, int32_t last, bt_lattice_way *f)
 {
     const bt_lattice *l = s->l;
     int n = 0;
@@ -471,7 +476,8 @@ static void follow(const search *s, int32_t last, bt_found *f)
     free(chain);
 }
 
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_found *f)
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak,
+                       bt_lattice_way *f)
 {
     bt_planner *p = l->p;
     const bt_route_task *t = &p->task;
@@ -495,7 +501,7 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
         s.cost[at] = 0;
         push(&s.open, (entry){bound_of(&s, 0, 0), at});
     }
-    *f = (bt_found){0};
+    *f = (bt_lattice_way){0};
     bool found = false;
     while (s.open.n > 0 && !found) {
         const entry e = pop(&s.open);
@@ -519,10 +525,11 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
     return found;
 }
 
-void bt_found_free(bt_found *f)
+void bt_lattice_way_free(bt_lattice_way *f)
 {
     free(f->point);
     free(f->leg);
     free(f->node);
     free(f->node_leg);
+    *f = (bt_lattice_way){0};
 }

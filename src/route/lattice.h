@@ -8,7 +8,7 @@
 typedef struct bt_lattice bt_lattice;
 
 /// What a search finds.
-typedef struct bt_found {
+typedef struct bt_lattice_way {
     int n_points;
     double (*point)[2]; ///< [n_points] corners and the last node, m, without the start; none: nothing was found
     int n_legs;
@@ -16,7 +16,7 @@ typedef struct bt_found {
     int n_nodes;
     double (*node)[3];  ///< [n_nodes] x, y, m, and heading, rad: the start, and each node after it
     int *node_leg;      ///< [n_nodes] legs up to it
-} bt_found;
+} bt_lattice_way;
 
 /// A lattice of places `spacing` m apart over the extent of p->task, through its start, with the x axis along (ax, ay);
 /// and p->ice, in its frame, with cells of `cell` m, of which the spacing is a multiple.
@@ -28,7 +28,8 @@ double bt_lattice_spacing(const bt_lattice *l);
 /// The cheapest way from the start to a node within 0.75 of the spacing from the goal (both ends of a line of points,
 /// or twice the same), under a limit of the mean force; for BT_ROUTE_PEAK that of the least largest force, which comes
 /// back in *peak, N. False when there is none.
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak, bt_found *f);
-void bt_found_free(bt_found *f);
+bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak,
+                       bt_lattice_way *f);
+void bt_lattice_way_free(bt_lattice_way *f);
 
 #endif

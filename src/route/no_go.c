@@ -81,7 +81,8 @@ double bt_no_go_distance(const bt_no_go *g, double x, double y)
         return least;
     }
     const int64_t b = (int64_t)(int)j * g->nx + (int)i;
-    for (int64_t k = g->first[b]; k < g->first[b + 1]; k++) least = bt_min(least, bt_no_go_to_edge(g, g->list[k], x, y));
+    for (int64_t k = g->first[b]; k < g->first[b + 1]; k++)
+        least = bt_min(least, bt_no_go_to_edge(g, g->list[k], x, y));
     return least;
 }
 

@@ -13,7 +13,7 @@
 #define MOST_STATES 1.5e6 ///< of a lattice whose spacing is chosen
 #define MOST_CELLS 3e6  ///< times speeds, of a raster whose cells are chosen
 #define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
-enum { TRIES = 4 };
+enum { TRIES = 4, ARRIVALS = 40 };
 
 // --- routes ----------------------------------------------------------------------------------------------------------
 
@@ -105,12 +105,13 @@ static void repel(bt_planner *p, const bt_route *r)
 // --- what a search finds made into a route ---------------------------------------------------------------------------
 
 /// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
-/// any: the cheapest of all nodes. False when none is allowed.
-static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
+/// any: the cheapest of all nodes. The goal is where it is at the time of arrival. False when none is allowed.
+static bool with_tail(const bt_planner *p, const bt_lattice_way *f, double arrival, int tries, bt_route *r)
 {
     const bt_route_task *t = &p->task;
     const double radius = t->radius > 0 ? t->radius : 1e-3 * t->width;
-    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg), *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    bt_leg *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
     bt_path_cost best = {.faults = BT_ROUTE_TURNS, .cost = INFINITY};
     int best_n = 0;
     const bool given = !isnan(t->goal_heading), any_start = isnan(t->start_heading);
@@ -119,7 +120,7 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
             for (int k = 0; k < (given ? 1 : t->headings); k++) {
                 double from[3] = {f->node[a][0], f->node[a][1], f->node[a][2]}, part[3][2], to[3];
                 if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / t->headings;
-                bt_way_goal(p, 0, from[0], from[1], to);
+                bt_way_goal(p, arrival, from[0], from[1], to);
                 to[2] = given ? t->goal_heading : 2 * BT_PI * k / t->headings;
                 bt_route_dubins(from, to, radius, part);
                 int n = f->node_leg[a];
@@ -139,6 +140,12 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
                 best = c, best_n = n;
                 memcpy(best_leg, leg, (size_t)n * sizeof *leg);
             }
+    const double *u = t->drift;
+    if (best_n > 0 && bt_hypot(u[0], u[1]) * fabs(best.time - arrival) > 1e-6 * t->width && tries > 0) {
+        free(leg);
+        free(best_leg);
+        return with_tail(p, f, best.time, tries - 1, r);
+    }
     const bool allowed = best_n > 0 && !(best.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) {
         double(*corner)[2];
@@ -152,10 +159,10 @@ static bool with_tail(const bt_planner *p, const bt_found *f, bt_route *r)
 }
 
 /// What was found, shortened; the straight line made cheaper, where that is better and direct is set.
-static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_route *r)
+static bool into_route(const bt_planner *p, const bt_lattice_way *f, bool direct, bt_route *r)
 {
     const bt_route_task *t = &p->task;
-    if (!isnan(t->goal_heading)) return with_tail(p, f, r);
+    if (!isnan(t->goal_heading)) return with_tail(p, f, bt_swath_cost(p, f->n_legs, f->leg, NULL).time, ARRIVALS, r);
     bt_way w = {0}, straight = {0};
     w.point = bt_alloc((size_t)(w.cap = f->n_points + 16), sizeof *w.point);
     const double *last = t->start;
@@ -178,7 +185,7 @@ static bool into_route(const bt_planner *p, const bt_found *f, bool direct, bt_r
     }
     bool allowed = !(w.cost.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) keep_way(p, r, &w);
-    else allowed = with_tail(p, f, r);
+    else allowed = with_tail(p, f, w.cost.time, ARRIVALS, r);
     free(w.point);
     free(straight.point);
     return allowed;
@@ -276,8 +283,11 @@ static bt_lattice *lattice_of(bt_planner *p)
     const bt_route_task *t = &p->task;
     const double area = (t->extent[2] - t->extent[0]) * (t->extent[3] - t->extent[1]);
     double goal[2], ax = 1, ay = 0, h = t->spacing, cell = t->cell;
-    bt_way_goal(p, 0, t->start[0], t->start[1], goal);
-    const double x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+    double x = 0, y = 0, far = 0;
+    for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice when the fastest speed has led there
+        bt_way_goal(p, far / t->speed[0], t->start[0], t->start[1], goal);
+        x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+    }
     if (!isnan(t->start_heading)) bt_sincos(t->start_heading, &ay, &ax);
     else if (far > 0) ax = x / far, ay = y / far;
     if (!(h > 0)) h = bt_max(t->width / 4, sqrt(area * t->headings / MOST_STATES));
@@ -311,23 +321,29 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
         p.penalty = wanted ? REPELS : 1;
         bt_swath_keep(&p);
         for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
-            bt_found f;
+            bt_lattice_way f = {0};
             double limit = t->force_limit, peak = 0;
             bool got = true;
             if (t->objective == BT_ROUTE_PEAK) {
                 got = bt_lattice_search(l, goal, BT_ROUTE_PEAK, limit, &peak, &f);
-                bt_found_free(&f);
+                bt_lattice_way_free(&f);
                 limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
             }
-            got = got && bt_lattice_search(l, goal, t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective, limit,
-                                           NULL, &f);
+            const int objective = t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective;
+            got = got && bt_lattice_search(l, goal, objective, limit, NULL, &f);
+            if (!got && !isnan(t->goal_heading)) { // a node of that heading may lie where no move ends: the tail turns
+                const double heading = t->goal_heading;
+                p.task.goal_heading = NAN;
+                got = bt_lattice_search(l, goal, objective, limit, NULL, &f);
+                p.task.goal_heading = heading;
+            }
             bt_route *r = &plan->route[plan->n];
             if (!got || !into_route(&p, &f, wanted == 0, r)) {
                 last = true;
-                if (got) bt_found_free(&f);
+                if (got) bt_lattice_way_free(&f);
                 break;
             }
-            bt_found_free(&f);
+            bt_lattice_way_free(&f);
             found_any++;
             kept = wanted == 0 ? apart(r, straight) > 1e-3 * t->width || fabs(r->cost - straight->cost) > 1e-6 * r->cost
                                : true;

@@ -24,7 +24,7 @@ void bt_way_price(const bt_planner *p, bt_way *w)
 {
     bt_path path;
     if (!bt_way_path(p, w, &path)) {
-        w->cost = (bt_path_cost){.faults = BT_ROUTE_TURNS, .cost = INFINITY};
+        w->cost = (bt_path_cost){.faults = BT_ROUTE_TURNS, .cost = INFINITY, .time = w->cost.time};
         return;
     }
     w->cost = bt_swath_cost(p, path.n - 1, path.leg, NULL);

@@ -17,9 +17,9 @@ double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
     return bt_max(d * bt_hypot(x, y) * (x * tx + y * ty), 1e-3 * d * v * v);
 }
 
-/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m². Between
-/// the middles of cells it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a turn
-/// sharper than W/2 a slice ends at its centre. Returns the number of cells.
+/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m².
+/// Between the middles of cells it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a
+/// turn sharper than W/2 a slice ends at its centre. Returns the number of cells.
 static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[CELLS], double area[CELLS])
 {
     const bt_route_ice *r = &p->ice;
@@ -140,8 +140,8 @@ static bt_path_cost leg_cost(const bt_planner *p, const bt_leg *leg, double t, b
     return c;
 }
 
-/// What a leg costs, kept: a step of the shortening leaves most legs as they are. Where no-go polygons move in the frame
-/// of the ice nothing is kept.
+/// What a leg costs, kept: a step of the shortening leaves most legs as they are. Where no-go polygons move in the
+/// frame of the ice nothing is kept.
 typedef struct bt_kept_leg {
     double x, y, tx, ty, length, turn, penalty;
     bt_path_cost cost;

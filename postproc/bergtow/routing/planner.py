@@ -92,8 +92,8 @@ class Route:
 
 @dataclass(frozen=True)
 class Plan:
-    """status: one of STATUS, with the numbers behind it in data. routes: the straight line first, then the planned ones,
-    best first. spacing and cell, m, of lattice and raster, states that the search looked at. cover [ny, nx]: ice
+    """status: one of STATUS, with the numbers behind it in data. routes: the straight line first, then the planned
+    ones, best first. spacing and cell, m, of lattice and raster, states that the search looked at. cover [ny, nx]: ice
     concentration over cover_extent x0, x1, y0, y1, for pictures."""
     status: str
     data: dict[str, Any]
@@ -333,8 +333,8 @@ def fit_weights(features: Sequence[Union[Mapping[str, float], Sequence[float]]],
     y = np.asarray(forces, dtype=float)
     if len(y) < 2 or rows.shape != (len(y), len(Weights._fields)) or not (np.isfinite(rows).all()
                                                                           and np.isfinite(y).all()):
-        raise BergtowError(f"weights cannot be fitted to {len(y)} tows with features of shape {rows.shape}; give two or "
-                           "more, and five finite features of each")
+        raise BergtowError(f"weights cannot be fitted to {len(y)} tows with features of shape {rows.shape}; give two "
+                           "or more, and five finite features of each")
     scale = np.abs(rows).max(axis=0)
     scale[scale == 0] = 1
     found = scipy.optimize.nnls(rows / scale, y)[0] / scale
