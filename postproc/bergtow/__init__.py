@@ -27,7 +27,7 @@ from .case import Case, quantities
 from .errors import BergtowError, CaseError
 from .force import Bodies, Force
 from .functions import (Outlines, Picture, budget, capability, converge, design, export, outlines, plot_chains,
-                        plot_ensemble, plot_field, plot_force, plot_impacts, plot_resistance, report, statistics)
+                        plot_ensemble, plot_field, plot_force, plot_impacts, plot_resistance, report, route, statistics)
 from .result.dataset import Result, open_result
 from .simulation import Simulation, run
 from .study.ensemble import Ensemble
@@ -35,6 +35,6 @@ from . import towing
 
 __version__ = "0.1.0"
 __all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Force", "Outlines", "Picture", "Result",
-           "Simulation", "budget", "capability", "converge", "design", "export", "library_path", "open_result", "outlines",
-           "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
-           "report", "run", "start_mpi", "statistics", "towing"]
+           "Simulation", "budget", "capability", "converge", "design", "export", "library_path", "open_result",
+           "outlines", "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
+           "report", "route", "run", "start_mpi", "statistics", "towing"]

@@ -33,7 +33,7 @@ def _folder(of: Of) -> str:
 
 
 #: options that a command takes several times, not once with several values
-_REPEATED = ("exclude", "also", "of")
+_REPEATED = ("exclude", "also", "of", "no_go")
 
 
 def _words(options: Mapping[str, Any]) -> list[str]:
@@ -254,6 +254,25 @@ def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **opti
     """How fast a vessel tows in which ice, and what stops it, a dictionary as OUT/capability.json has it. options:
     those of `bergtow capability`; from_ and to for its range."""
     return _found("capability", case, out, options)
+
+
+def _place(value: Any) -> str:
+    """A position or a line as an option has it: (3000, 400) or ((3000, -100), (3000, 100)), m; texts stay."""
+    if isinstance(value, str):
+        return value
+    return (":" if hasattr(value[0], "__len__") else ",").join(_place(v) if hasattr(v, "__len__") else repr(float(v))
+                                                               for v in value)
+
+
+def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any, **options: Any) -> dict[str, Any]:
+    """The way and the speed of a tow through known ice, a dictionary as OUT/route.json has it. to: the goal, (x, y) in
+    m, two points of a line, or a text as of `bergtow route`, "20.1E,76.5N". options: those of `bergtow route`, as
+    from_=(0, 0), no_go=["land.geojson"], members=1, plan_only=True."""
+    places = {k: _place(v) for k, v in {"to": to, "from_": options.pop("from_", None)}.items() if v is not None}
+    speeds = options.get("speeds")
+    if isinstance(speeds, (list, tuple)):
+        options["speeds"] = ",".join(map(str, speeds))
+    return _found("route", case, out, places | options)
 
 
 def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:

@@ -37,6 +37,8 @@ static const struct {
      bt_cmd_python, false, false},
     {"design", "from a case or a study to the report of the design tow force, as a page and as PDF",
      bt_cmd_python, false, false},
+    {"route", "plan the way and the speed of a tow through known ice, and verify them by tows",
+     bt_cmd_python, false, false},
     {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines",
      bt_cmd_python, false, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true, true},

@@ -47,6 +47,8 @@ CALLS = [
     ("converge", ["case.yml", "-o", "."], ["converge.json"]),
     ("budget", ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
     ("capability", ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
+    ("route", ["case.yml", "--to", "12,0", "--plan-only", "--routes", "1", "-o", "."],
+     ["routes.geojson", "route.json", "route.png", "straight.yml"]),
     ("outlines", ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
      ["a.geojson", "a.json", "a.png"]),
     ("design", ["case.yml", "-o", "."], ["answer.json", "design.yml", "report.html", "report.pdf", "replay.html"]),

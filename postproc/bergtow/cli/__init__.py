@@ -24,6 +24,7 @@ COMMANDS = {
     "budget": ("study.budget", "find out how much of the scatter is of the fields, of each assumed value, of the "
                "computation"),
     "capability": ("study.capability", "find out how fast a vessel tows in which ice, and the ice that stops it"),
+    "route": ("routing.route", "plan the way and the speed of a tow through known ice, and verify them by tows"),
     "outlines": ("maps.outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines"),
     "export": ("maps.export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, "
                "trajectories"),
@@ -38,7 +39,7 @@ COMMANDS = {
     "plot-ensemble": ("plot.ensemble", "draw the pictures of an ensemble that its study supports"),
 }
 #: options whose value may begin with a minus: a western longitude is no option, nor is a negative label
-SIGNED = ("--centre", "--heading", "--water", "--unseen", "--footprint")
+SIGNED = ("--centre", "--heading", "--water", "--unseen", "--footprint", "--from", "--to")
 
 
 def _joined(words):

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""A receding horizon: plan, tow for a while, look at the ice again, plan the rest.
+
+Every look is a tow from the start up to that time, along the way that was decided by then; a new plan leaves that way as
+it is, so that the tow up to the look is the same, to the bit, and the last one is a single case from start to goal. Of
+the rejected alternative, to begin anew with the ice as it lies, the floes would come to rest at every look.
+
+The ice of the tow is that of the case. A look sees its floes as they lay `age` before, carried on with the mean drift,
+with the errors of the map. With neither age nor errors the look is perfect, which no one has: the gain is an upper
+bound.
+"""
+import dataclasses
+
+from bergtow import writing
+from bergtow.errors import CASE, IO, USAGE, RunError
+from bergtow.result.run import Run
+from bergtow.routing import members, output, situation, tows
+from bergtow.study.runs import SPENT
+from bergtow.text import route as words
+
+import numpy as np
+
+MOST = 100       # looks
+FINE = 1e-4      # body widths that a polyline may be off the way of a body that is led by its speed
+AHEAD = 2        # steps that what is decided reaches beyond a look
+
+
+def seen(ice, errors, k):
+    """The floes as look k sees them."""
+    rng, n, half = np.random.default_rng([members.SEED, 2, k]), len(ice.outlines), np.sqrt(0.5)
+    common, shift, thick, each = (rng.standard_normal(shape) for shape in (2, (n, 2), (), n))
+    moved = errors.position * half * (common + shift)
+    sigma = np.sqrt(np.log1p(errors.thickness ** 2))
+    return dataclasses.replace(ice, outlines=[o + m for o, m in zip(ice.outlines, moved)], thickness=np.asarray(
+        ice.thickness) * np.exp(sigma * half * (thick + each) - sigma ** 2 / 2))
+
+
+def led(route, s, speed):
+    """[m, 2] over the ground, from where the plan begins: of the body, or of the end that pulls it."""
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
+    moved = np.outer(way / speed, s.drift)
+    if s.mode == "speed":
+        return tows.simplified(np.column_stack([route.x, route.y]) + moved, FINE * s.hull.width)
+    end, new = tows.tug_track(route, s)
+    return tows.simplified(end + moved[new], tows.STRAIGHT * s.hull.width)
+
+
+def with_point(points, way):
+    """A polyline [n, 2] with a point at `way` m of it: (points, its number). A tow up to there is the same, to the bit,
+    along every way that begins with these points: a leg that ended elsewhere would have another last digit."""
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    passed = np.append(0.0, np.cumsum(lengths))
+    k = min(int(np.searchsorted(passed, way, side="right")) - 1, len(lengths) - 1)
+    at = points[k] + (points[k + 1] - points[k]) * (way - passed[k]) / lengths[k]
+    if min(np.hypot(*(at - points[k])), np.hypot(*(at - points[k + 1]))) < 1e-6 * lengths[k]:
+        return points, k if way - passed[k] < lengths[k] / 2 else k + 1
+    return np.insert(points, k + 1, at, axis=0), k + 1
+
+
+def best(plan):
+    """The cheapest route of a plan that is allowed; None where there is none."""
+    some = [r for r in plan.routes if not r.faults]
+    return min(some, key=lambda r: r.cost) if some else None
+
+
+class Horizon:
+    """Its tows."""
+
+    def __init__(self, a, w, s, goal, runs, files, found):
+        self.a, self.w, self.s, self.goal, self.runs, self.files, self.found = a, w, s, goal, runs, files, found
+        self.speed, self.dt = w["speeds"][0], s.values["run.dt"]
+
+    def keys(self, points, duration):
+        return {"tow.waypoints": tows.pairs(points[1:]), "tow.speed": f"{self.speed:.10g} m/s",
+                "tow.ramp": f"{self.s.ramp:.10g} s", "output.window_start": "-1 s",
+                "run.duration": f"{self.dt * np.ceil(duration / self.dt - 1e-9):.10g} s"}
+
+    def tow(self, name, points, duration):
+        """The folder of a tow. Errors: RunError."""
+        keys = self.keys(points, duration)
+        why = self.runs.make(name, range(1), keys)
+        if SPENT in why:
+            raise RunError(self.files.folder, f"the budget of {self.a.budget:g} min is spent before every tow is made",
+                           "call again: what is made is kept", IO)
+        if why[0]:
+            self.runs.tell_failed()
+        return self.runs.path(name, 0)
+
+    def whole(self, name, points, c):
+        """The outcome of a tow along all of a polyline, and its folder."""
+        path = self.tow(name, points, self.duration(points))
+        with Run(path) as run:
+            return tows.outcome(run, c, self.goal, self.s, self.w["limit"]), path
+
+    def duration(self, points):
+        way = np.sum(np.hypot(*np.diff(points, axis=0).T))
+        return tows.LONGER[self.s.mode] * (way / self.speed + self.s.ramp / 2)
+
+    def way(self, time):
+        """Of what is led, a few steps after a time, m."""
+        time, ramp = time + AHEAD * self.dt, self.s.ramp
+        return self.speed * (time - ramp / 2 if time > ramp else time ** 2 / (2 * ramp) if ramp > 0 else time)
+
+    def look(self, k, time, points):
+        """(ice, start, heading, decided points) at a look."""
+        s = self.s
+        points, last = with_point(points, self.way(time))
+        decided, tangent = points[:last + 1], points[last] - points[last - 1]
+        path = self.tow(f"look-{k}", points, time)
+        with Run(path) as run:
+            frame = run.frame_at(time - self.w["age"])
+            moved = np.array(s.drift) * (time - run.frame_times[frame])
+            outlines = run.polygons(frame)
+            ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in s.moving],
+                                      thickness=run.thickness[s.moving])
+            body = np.array([run["body_x"][-1], run["body_y"][-1]])
+            if s.mode == "speed":
+                start, heading = decided[-1], np.arctan2(*tangent[::-1])
+            else:
+                line = decided[-1] - body
+                heading = np.arctan2(*line[::-1])
+                start = decided[-1] - s.line * line / np.hypot(*line)
+        return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided
+
+
+def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
+    """Tow with new looks, once planned, and straight, through the ice of the case; write and say what came out."""
+    from bergtow.routing import route as command
+    if len(w["speeds"]) > 1:
+        raise RunError("--replan", "plans the way at one speed", "give --speeds one speed", USAGE)
+    if w["age"] > w["replan"]:
+        raise RunError("--map-age", "is longer than --replan", "take a map that is younger than the time between looks",
+                       USAGE)
+    runs.members = [members.Member(situation.reading(s.values, s.field))]
+    h = Horizon(a, w, s, goal, runs, files, found)
+    perfect = w["errors"].none and not w["age"]
+    first = plan if w["errors"].none else command.planned(a, w, s, goal, weights, factor,
+                                                          ice=seen(s.ice, w["errors"], 0))
+    route = best(first)
+    if route is None:
+        raise RunError("bergtow route", "no route is allowed at the first look", "take a higher --force-limit, or a "
+                       "smaller --radius or --clearance", CASE)
+    points = once = led(route, s, h.speed)
+    found["horizon"] = {"every": w["replan"], "age": w["age"], "perfect": perfect, "tows": {}}
+
+    def noted(k, time, status, r):
+        found["rounds"].append({"time": time, "status": status, "length": r.length if r else np.nan,
+                                "work": r.work if r else np.nan, "waypoints": points[1:]})
+        writing.write_json({"keys": h.keys(points, time)} | found["rounds"][-1], files.folder / f"round-{k}.json",
+                           a.force)
+        files.write(found)
+
+    noted(0, 0.0, first.status, route)
+    left = route.duration
+    for k in range(1, MOST):
+        time = k * w["replan"]
+        if left <= w["replan"]:
+            break
+        ice, start, heading, decided = h.look(k, time, points)
+        new = command.planned(a, w, s, goal, weights, factor, ice=ice, start=start, start_heading=heading)
+        route = best(new)
+        if route:
+            ahead = led(route, s, h.speed)
+            far = np.hypot(*(ahead - decided[-1]).T) > 0.1 * s.hull.width
+            points = np.vstack([decided, ahead[np.argmax(far):]])
+            left = route.duration
+        else:
+            left -= w["replan"]
+        noted(k, time, new.status, route)
+    by_name = {r["name"]: r for r in found["routes"]}
+    straight, some = next(c for c in files.some if c.straight), {}
+    for name, way in (("horizon", points), ("once", once), ("straight", led(straight.route, s, h.speed))):
+        track = straight.track if name == "straight" else way
+        c = tows.Candidate(name, name, straight.route, h.speed, {}, track)
+        found["horizon"]["tows"][name], some[name] = h.whole(f"tow-{name}", way, c)
+        files.write(found)
+    by_name["straight"]["simulated"] = command.means([found["horizon"]["tows"]["straight"]])
+    c = tows.Candidate("horizon", "with new looks", route or first.routes[0], h.speed, h.keys(
+        points, h.duration(points)), points, None, points[1:])
+    output.case(c, files.folder / "route-base.yml", files.folder / "horizon.yml", a.force)
+    files.write(found, picture=True)
+    told = writing.plain(found)
+    print(words.rounds(told))
+    command.page(a, found, [("with new looks", some["horizon"]), ("straight line", some["straight"])], files.folder)

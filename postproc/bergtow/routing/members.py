@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Members of a map: the ice as it may be, given what the map may be wrong by. The same members for every route.
+
+    position    m, standard deviation of a floe's place along each axis: half of the variance is of the whole map, as of
+                its placing on the earth, half of the floe. A floe's own part is cut at half the distance to the nearest
+                other one, so that none overlap; the map keeps its place across walls.
+    thickness   standard deviation / thickness, lognormal: half of the variance of the whole map, half of the floe
+    drift       m/s, standard deviation of each component of the drift: that much current is added, in which ice and
+                body drift
+
+The halves are assumed. Floes that come to lie on the towed body or leave the domain are left out, and counted.
+"""
+from dataclasses import dataclass
+
+from bergtow.errors import CASE, RunError
+from bergtow.routing import apart
+from bergtow.routing.situation import reading
+
+import h5py
+import numpy as np
+from scipy.spatial import cKDTree
+
+SEED = 53
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Standard deviations of a map."""
+
+    position: float   #: m
+    thickness: float  #: of the thickness
+    drift: float      #: m/s
+
+    @property
+    def none(self):
+        return not (self.position or self.thickness or self.drift)
+
+
+@dataclass
+class Member:
+    """One state of the ice."""
+
+    keys: dict           #: of the case, as texts
+    left_out: int = 0    #: floes on the towed body or out of the domain
+    drift: tuple = (0.0, 0.0)  #: added to that of the map, m/s
+
+
+@dataclass
+class Floes:
+    """A field file."""
+
+    vertices: np.ndarray
+    offsets: np.ndarray
+    pose: np.ndarray
+    thickness: np.ndarray
+    area: np.ndarray
+    attributes: dict
+
+    @classmethod
+    def read(cls, file):
+        with h5py.File(file) as f:
+            g = f["floes"]
+            return cls(*(g[name][...] for name in ("vertices", "offsets", "pose", "thickness", "area")),
+                       {k: g.attrs[k] for k in ("ice_area", "frame", "x_min", "x_max", "y_min", "y_max")
+                        if k in g.attrs})
+
+    def write(self, file):
+        with h5py.File(file, "w") as f:
+            g = f.create_group("floes")
+            for name in ("vertices", "offsets", "pose", "thickness", "area"):
+                g[name] = getattr(self, name)
+            for name, value in self.attributes.items():
+                g.attrs[name] = value
+            g.attrs["concentration"] = self.area.sum() / g.attrs["ice_area"]
+            g.attrs["n_floes"] = len(self.area)
+
+    def outlines(self):
+        """[n, 2] each, m."""
+        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
+        return [self.vertices[a:b] @ np.array([[c[i], s[i]], [-s[i], c[i]]]) + self.pose[i, :2]
+                for i, (a, b) in enumerate(zip(self.offsets, self.offsets[1:]))]
+
+    def take(self, kept):
+        """Those floes alone."""
+        counts = np.diff(self.offsets)
+        owner = np.repeat(kept, counts)
+        return Floes(self.vertices[owner], np.append(0, np.cumsum(counts[kept])), self.pose[kept],
+                     self.thickness[kept], self.area[kept], self.attributes)
+
+
+def room(outlines, most):
+    """[n] half the distance of each floe to the nearest other one, m, at most `most`."""
+    out = np.full(len(outlines), float(most))
+    if len(outlines) < 2 or not most > 0:
+        return out
+    centre = np.array([o.mean(axis=0) for o in outlines])
+    reach = np.array([apart.radius(o, c) for o, c in zip(outlines, centre)])
+    tree = cKDTree(centre)
+    for i, near in enumerate(tree.query_ball_point(centre, reach + reach.max() + 2 * most)):
+        for j in near:
+            if j > i and np.hypot(*(centre[i] - centre[j])) - reach[i] - reach[j] < 2 * max(out[i], out[j]):
+                half = apart.of(outlines[i], outlines[j]) / 2
+                out[i], out[j] = min(out[i], half), min(out[j], half)
+    return out
+
+
+def clear_of_hull(floes, outlines, situation, start=None, yaw=None):
+    """[n] of bool: floes that do not lie on the towed body where it starts."""
+    start = np.array(situation.start if start is None else start)
+    yaw = situation.values["body.yaw"] if yaw is None else yaw
+    c, s = np.cos(yaw), np.sin(yaw)
+    hull = situation.outline @ np.array([[c, s], [-s, c]]) + start
+    reach = situation.hull.radius
+    centres = [o.mean(axis=0) for o in outlines]
+    return np.array([np.hypot(*(centre - start)) > reach + apart.radius(o, centre) or apart.of(o, hull) > 0
+                     for o, centre in zip(outlines, centres)], dtype=bool)
+
+
+def drawn(n, situation, errors, folder):
+    """n Members, or the one of a map without errors. Errors: RunError."""
+    as_read = reading(situation.values, situation.field)
+    if errors.none:
+        return [Member(as_read)]
+    if errors.drift and situation.values["water.current_table"]:
+        raise RunError("water.current_table", "leaves no room for an error of the drift", "set --drift-error 0, or "
+                       "give a constant current in water.current_x and current_y", CASE)
+    floes = Floes.read(situation.field)
+    own = room(floes.outlines(), 4 * errors.position) if errors.position else None
+    folder.mkdir(parents=True, exist_ok=True)
+    return [one(k, floes, own, situation, errors, folder, as_read) for k in range(n)]
+
+
+def one(k, floes, own, situation, errors, folder, as_read):
+    """Member k, whose ice is FOLDER/mNNN.h5."""
+    rng, n, values = np.random.default_rng([SEED, k]), len(floes.area), situation.values
+    walled = np.array([values[f"domain.{side}"] == "wall" for side in ("ends", "sides")])
+    # every draw is made whatever the errors, so that a larger error is the same member further out
+    common, shift, thick, each, current = (rng.standard_normal(shape) for shape in (2, (n, 2), (), n, 2))
+    pose, half = floes.pose.copy(), np.sqrt(0.5)
+    low, high = np.array(situation.extent[:2]), np.array(situation.extent[2:])
+    if errors.position and n:
+        step = errors.position * half * shift
+        length = np.hypot(*step.T)
+        limit = own.copy()
+        for axis in np.flatnonzero(walled):
+            ends = np.array([(o[:, axis].min(), o[:, axis].max()) for o in floes.outlines()])
+            limit = np.minimum(limit, np.maximum(0, np.minimum(ends[:, 0] - low[axis], high[axis] - ends[:, 1])))
+        pose[:, :2] += step * np.minimum(1, limit / np.maximum(length, 1e-300))[:, None]
+        pose[:, :2] += np.where(walled, 0.0, errors.position * half * common)
+    sigma = np.sqrt(np.log1p(errors.thickness ** 2))
+    factor = np.exp(sigma * half * (thick + each) - sigma ** 2 / 2)
+    moved = Floes(floes.vertices, floes.offsets, pose, np.clip(floes.thickness * factor, 1e-6, 100), floes.area,
+                  floes.attributes)
+    periodic = np.array([values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")])
+    moved.pose[:, :2] = np.where(periodic, low + (moved.pose[:, :2] - low) % (high - low), moved.pose[:, :2])
+    kept = np.all((moved.pose[:, :2] >= low) & (moved.pose[:, :2] <= high), axis=1)
+    kept &= clear_of_hull(moved, moved.outlines(), situation)
+    file = folder / f"m{k + 1:03d}.h5"
+    moved.take(kept).write(file)
+    drift = errors.drift * current
+    keys = as_read | {"ice.field": str(file)}
+    if errors.drift:
+        keys |= {f"water.current_{axis}": f"{values[f'water.current_{axis}'] + d:.12g} m/s"
+                 for axis, d in zip("xy", drift)}
+    return Member(keys, int(np.sum(~kept)), tuple(map(float, drift)))

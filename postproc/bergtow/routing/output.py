@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Routes as files: GeoJSON for charts, GPX for the bridge, a case a route for the program."""
+import json
+import os
+from xml.sax.saxutils import escape, quoteattr
+
+from bergtow import writing
+from bergtow.routing.situation import LOCAL
+
+import numpy as np
+
+
+def positions(xy, place):
+    """[[east, north]] of metres of the case: degrees where the case has a place, otherwise metres."""
+    if place.origin is None:
+        return np.round(place.map(xy), 4).tolist()
+    return np.round(place.degrees(xy), 8).tolist()
+
+
+def features(candidates, place, numbers):
+    """GeoJSON features: of every candidate the track of the body, of the towing end, and the swath. numbers: {name:
+    properties}."""
+    out = []
+    for c in candidates:
+        parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.route.swath)]
+        if c.tug is not None:
+            parts.insert(1, ("tug", "LineString", c.tug))
+        for kind, shape, xy in parts:
+            at = positions(xy, place)
+            at = [at + at[:1]] if shape == "Polygon" else at
+            out.append({"type": "Feature", "properties": {"route": c.name, "track": kind, **numbers[c.name]},
+                        "geometry": {"type": shape, "coordinates": at}})
+    return out
+
+
+def geojson(candidates, place, numbers, path, force):
+    """Metres east and north of x = y = 0, by their own crs, where the case has no place. Errors: RunError."""
+    crs = {} if place.origin else {"crs": {"type": "name", "properties": {"name": LOCAL}}}
+    found = {"type": "FeatureCollection", **crs, "made_by": writing.MARK,
+             "features": features(candidates, place, numbers)}
+    writing.write_text(json.dumps(writing.plain(found), allow_nan=False) + "\n", path, force)
+
+
+def gpx(candidates, place, path, force):
+    """Route points of the towing end, or of the body where nothing but it is led. Errors: RunError."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>',
+             '<gpx version="1.1" creator="bergtow" xmlns="http://www.topografix.com/GPX/1/1">',
+             f" <metadata><desc>{escape(writing.MARK)}</desc></metadata>"]
+    for c in candidates:
+        points = place.degrees(c.points)
+        lines += [f" <rte><name>{escape(c.label)}</name>", f"  <desc>{'body' if c.tug is None else 'vessel'}</desc>"]
+        lines += [f"  <rtept lat={quoteattr(f'{lat:.7f}')} lon={quoteattr(f'{lon:.7f}')}/>" for lon, lat in points]
+        lines.append(" </rte>")
+    writing.write_text("\n".join([*lines, "</gpx>"]) + "\n", path, force)
+
+
+def case(c, base, path, force):
+    """The case of a route, which the program runs as it is. Errors: RunError."""
+    keys = {"run.title": f"tow along {c.label}", **c.keys}
+    found = {"base": os.path.relpath(base, path.parent)}
+    for key, text in keys.items():
+        section, name = key.split(".", 1)
+        found.setdefault(section, {})[name] = text
+    said = json.dumps(found, indent=1, ensure_ascii=False)
+    for key in ("tow.waypoints", "tow.programme"):  # lists, not texts
+        if key in keys:
+            said = said.replace(json.dumps(keys[key]), keys[key])
+    writing.write_text(f"# {writing.MARK}\n{said}\n", path, force)

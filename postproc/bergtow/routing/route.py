@@ -1,0 +1,418 @@
+# SPDX-License-Identifier: MIT
+"""Route and speed of a tow through known ice.
+
+    bergtow route CASE.yml --to "3 km,0.4 km" -o DIR           four candidates, ten members of the map
+    bergtow route CASE.yml --to 20.3E,76.6N --plan-only        in seconds, without tows
+    bergtow route CASE.yml --to "3 km,0" --replan "30 min"     with a new look at the ice every half hour
+
+Planned by routing/planner.py with a cost that is an estimate; then every candidate is towed through the same ice, and
+the tows decide (routing/verdict.py). Each file is written as soon as it exists. The same call goes on where it was
+stopped: tows are those of study/runs.py.
+"""
+import base64
+import json
+import time
+from pathlib import Path
+
+from bergtow import writing
+from bergtow._program import program_path
+from bergtow.arguments import not_below_zero, whole_from
+from bergtow.errors import CASE, IO, USAGE, RunError
+from bergtow.result.run import Run
+from bergtow.routing import apart, members, output, planner, situation, tows, verdict
+from bergtow.study import analysis
+from bergtow.study.runs import SPENT, checked, locked
+from bergtow.text import route as words
+
+import numpy as np
+
+BUDGET = 60.0            # min
+ROUTES, MEMBERS = 3, 10
+#: errors of a map where none are said, assumed: of the hull's width, of the thickness, of the speed of the tow
+POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
+#: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line and
+#: so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards by 27°
+RADIUS, LENGTHS = 2.0, 2.0
+RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
+SWATH = 15.0             # hull widths: least length of a swath of --calibrate
+FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "route.json", "route.png", "route.html")
+
+#: status of a plan without routes: (what is named, why, remedy)
+STATUS = {
+    "start_no_go": ("--from", "the body would lie in an area to keep out of", "start elsewhere, or take less --clearance"),
+    "goal_no_go": ("--to", "the goal lies in an area to keep out of, or too near to one for the body",
+                   "choose a goal in free water, or take less --clearance"),
+    "start_outside": ("--from", "the body would reach out of the domain", "start elsewhere, or enlarge the domain"),
+    "goal_outside": ("--to", "the goal lies outside the domain, or too near to its edge for the body",
+                     "choose a goal within, or enlarge the domain"),
+    "start_too_thick": ("--from", "the ice about the start takes more than --force-limit at every speed",
+                        "start elsewhere, or take a lower speed or a higher limit"),
+    "goal_too_thick": ("--to", "the ice about the goal takes more than --force-limit at every speed",
+                       "choose another goal, or take a lower speed or a higher limit"),
+    "no_route": ("bergtow route", "no way leads from the start to the goal",
+                 "take a smaller --radius, --clearance or --width, or a higher --force-limit"),
+    "goal_drifts_away": ("--to", "the goal drifts away from the ice faster than the body is towed",
+                         "take a higher speed"),
+}
+
+
+# ---- command line
+
+
+def options(p):
+    p.add_argument("case", metavar="CASE.yml", type=Path)
+    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, in degrees as "
+                   "20.1E,76.5N where the map has a place; X,Y:X,Y is a line, at any point of which the tow may end")
+    p.add_argument("--from", dest="start", metavar="X,Y", help="start (default: where the case has the body)")
+    p.add_argument("--map", type=Path, metavar="FILE", help="the ice: outlines (.geojson) or a field (.h5) in place of "
+                   "that of the case")
+    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons to keep out "
+                   "of: land, shoals, zones; may be repeated. Fixed floes of the case are such areas, too")
+    p.add_argument("--clearance", metavar="M", default="0 m", help="distance to keep from them (default 0 m)")
+    p.add_argument("--objective", choices=tuple(words.UNITS), default="work", help="what is to be small (default work)")
+    p.add_argument("--speeds", metavar="V,V", help="speeds to choose among (default: tow.speed)")
+    p.add_argument("--force-limit", metavar="F", help="tow force or tension that is not to be exceeded")
+    p.add_argument("--routes", type=whole_from(1, 20), default=ROUTES, metavar="K", help="routes besides the straight "
+                   f"line, at least a width apart (default {ROUTES})")
+    p.add_argument("--members", type=whole_from(1, 1000), default=MEMBERS, metavar="N", help="members of the map that "
+                   f"every route is towed through (default {MEMBERS}; a map without errors has one)")
+    p.add_argument("--map-error", metavar="M", help=f"of a floe's position, standard deviation (default {POSITION:g} "
+                   "widths of the body, assumed)")
+    p.add_argument("--thickness-error", type=not_below_zero, default=THICKNESS, metavar="S",
+                   help="of the thickness, standard deviation over the thickness (default %(default)g, assumed)")
+    p.add_argument("--drift-error", metavar="V", help="of each component of the drift, standard deviation (default "
+                   f"{DRIFT:g} of the speed, assumed)")
+    p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
+                   "swaths towed through the map first, at least 6 (default 0: none)")
+    p.add_argument("--replan", metavar="S", help="look at the ice anew after every S of the tow and plan the rest")
+    p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default 0 s)")
+    p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
+    p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
+                   f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
+    p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
+    p.add_argument("--cell", metavar="M", help="of the raster of costs (default: an eighth of the width, or more)")
+    p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in the "
+                   "unit of the objective (default 0)")
+    p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
+    p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
+                   "the same call goes on")
+    analysis.add_options(p, BUDGET)
+
+
+def _above(text, unit, option):
+    value = situation.number(text, unit, f"{option} {text}")
+    if not (np.isfinite(value) and value > 0):
+        raise RunError(f"{option} {text}", "is not above 0", "give a number above 0", USAGE)
+    return value
+
+
+def _not_below(text, unit, option):
+    value = situation.number(text, unit, f"{option} {text}")
+    if not (np.isfinite(value) and value >= 0):
+        raise RunError(f"{option} {text}", "is below 0", "give 0 or more", USAGE)
+    return value
+
+
+def wanted(a, s):
+    """Numbers of the options, in SI: {"speeds", "errors", "radius", ...}. s: Situation."""
+    speeds = sorted({_above(t, "m/s", "--speeds") for t in a.speeds.split(",")}) if a.speeds else [s.values["tow.speed"]]
+    if not speeds[0] > 0:
+        raise RunError("tow.speed", "is 0: nothing reaches a goal", "give --speeds", CASE)
+    if a.members == 1 and a.map_error is None and a.drift_error is None and a.thickness_error == THICKNESS:
+        errors = members.Errors(0.0, 0.0, 0.0)
+    else:
+        errors = members.Errors(
+            _not_below(a.map_error, "m", "--map-error") if a.map_error else POSITION * s.hull.width, a.thickness_error,
+            _not_below(a.drift_error, "m/s", "--drift-error") if a.drift_error else DRIFT * speeds[-1])
+    if a.drift_error is None and s.values["water.current_table"] and errors.drift:
+        errors = members.Errors(errors.position, errors.thickness, 0.0)
+    return {"speeds": tuple(speeds), "errors": errors,
+            "assumed": a.map_error is None or a.drift_error is None or a.thickness_error == THICKNESS,
+            "limit": _above(a.force_limit, "N", "--force-limit") if a.force_limit else np.inf,
+            "radius": _not_below(a.radius, "m", "--radius") if a.radius else
+            max(s.line, LENGTHS * s.mass / s.hull.drag) if s.line else RADIUS * s.hull.width,
+            "clearance": _not_below(a.clearance, "m", "--clearance"),
+            "cell": _above(a.cell, "m", "--cell") if a.cell else None,
+            "replan": _above(a.replan, "s", "--replan") if a.replan else None,
+            "age": _not_below(a.map_age, "s", "--map-age")}
+
+
+def planned(a, w, s, goal, weights, factor, **more):
+    """planner.plan() with the options. more: of planner.plan()."""
+    given = {"speeds": w["speeds"], "objective": a.objective, "force_limit": w["limit"], "force_factor": factor,
+             "no_go": s.no_go, "clearance": w["clearance"], "radius": w["radius"], "headings": a.headings,
+             "cell": w["cell"], "turn_cost": a.turn_cost, "routes": a.routes, "weights": weights, "drift": s.drift,
+             "water": s.water, "extent": s.extent} | more
+    ice, start = given.pop("ice", s.ice), given.pop("start", s.start)
+    return planner.plan(ice, s.hull, start, goal, **given)
+
+
+def refuse(plan, found, path, force):
+    """Errors: RunError where a plan has no routes; what was found is written first."""
+    if plan.status not in STATUS:
+        return
+    writing.write_json(found | {"status": plan.status, "status_data": plan.data, "routes": []}, path, force)
+    what, why, remedy = STATUS[plan.status]
+    numbers = ", ".join(f"{k} {v:.4g}" for k, v in plan.data.items() if isinstance(v, (int, float)))
+    raise RunError(what, why + (f" ({numbers})" if numbers else ""), remedy, CASE)
+
+
+# ---- calibration
+
+
+def swaths(n, s, length):
+    """n straight swaths within the domain and clear of areas to keep out of: [(start, end)]. Errors: RunError."""
+    rng, out = np.random.default_rng([members.SEED, 1]), []
+    low, high = np.array(s.extent[:2]) + s.hull.radius, np.array(s.extent[2:]) - s.hull.radius
+    for _ in range(1000 * n):
+        a, turn = rng.uniform(low, high), rng.uniform(0, 2 * np.pi)
+        b = a + length * np.array([np.cos(turn), np.sin(turn)])
+        if np.all((b > low) & (b < high)):
+            way = np.column_stack([np.linspace(a, b, 50), np.zeros(50)])
+            if apart.least(way, s.outline, s.no_go, 0.0) > 0:
+                out.append((a, b))
+        if len(out) == n:
+            return out
+    raise RunError("--calibrate", f"there is no room for {n} straight swaths of {length:.4g} m", "take fewer, or leave it "
+                   "out", CASE)
+
+
+def calibrated(a, w, s, runs):
+    """(weights, factor of peak over mean, what is said) by straight tows through the map."""
+    if a.calibrate < 6:
+        raise RunError(f"--calibrate {a.calibrate}", "are too few swaths for five weights", "take 6 or more", USAGE)
+    speed = w["speeds"][-1]
+    length = min(max(SWATH * s.hull.width, 1.5 * speed * s.ramp), 0.6 * min(s.extent[2] - s.extent[0],
+                                                                            s.extent[3] - s.extent[1]))
+    floes, folder = members.Floes.read(s.field), s.field.parent / "swaths"
+    outlines = floes.outlines()
+    folder.mkdir(parents=True, exist_ok=True)
+    features, forces, ratios = [], [], []
+    for k, (start, end) in enumerate(swaths(a.calibrate, s, length)):
+        yaw = float(np.arctan2(*(end - start)[::-1]))
+        file = folder / f"s{k + 1:03d}.h5"
+        floes.take(members.clear_of_hull(floes, outlines, s, start, yaw)).write(file)
+        route = planner.straight_route(s.ice, s.hull, start, end, speed=speed, extent=s.extent, cell=w["cell"],
+                                       drift=s.drift, water=s.water)
+        c = tows.candidate(f"swath-{k + 1}", f"swath {k + 1}", route, speed, s)
+        keys = c.keys | situation.reading(s.values, file) | {
+            f"body.{name}": f"{value:.12g} {unit}" for name, value, unit in
+            (("x", start[0], "m"), ("y", start[1], "m"), ("yaw", yaw, "rad"))}
+        made = tow(runs, c.name, range(1), keys)
+        if made[0]:
+            continue
+        with Run(runs.path(c.name, 0)) as run:
+            t = run["time"]
+            late = (t > s.ramp) & np.isfinite(run["ice_resistance"])
+            force = run["tow_force"][late]
+            if len(force) < 2:
+                continue
+            forces.append(force.mean())
+            ratios.append(np.percentile(force, tows.PEAK) / force.mean())
+        features.append(route.features)
+    if len(forces) < 6:
+        raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, or "
+                       "leave --calibrate out")
+    fit = planner.fit_weights(features, np.array(forces))
+    rank = float(fit.rank_correlation)
+    told = {"swaths": len(forces), "r2": float(fit.r2), "rank_correlation": rank,
+            "weights": dict(zip(planner.Weights._fields, map(float, fit.weights))), "force_factor":
+            float(np.median(ratios)), "poor": not rank >= RANKS_POORLY}
+    print(words.calibration(told))
+    return planner.Weights(*fit.weights), told["force_factor"], told
+
+
+def tow(runs, name, some, keys):
+    """Make the tows of some members, and say why those failed that did."""
+    why = runs.make(name, some, keys)
+    for i, reason in zip(some, why):
+        if reason and reason != SPENT:
+            runs.tell((name, i), f"{runs.path(name, i)}: {reason}")
+    return why
+
+
+# ---- what was found
+
+
+def described(c, s):
+    """A candidate, for JSON."""
+    r = c.route
+    by_legs = not np.isfinite(c.speed)
+    seconds = r.duration if by_legs else r.length / c.speed
+    return {"name": c.name, "label": c.label, "kind": r.kind, "speed": c.speed, "case": f"{c.name}.yml",
+            "faults": list(r.faults), "waypoints": c.points, "predicted": {
+                "length": r.length, "time": seconds, "work": r.work, "mean_force": r.force, "peak_of_legs": r.peak,
+                "ice_area": r.ice_area, "ice_mass": r.ice_mass, "clearance": r.clearance, "cost": r.cost,
+                "features": r.features}}
+
+
+def means(some):
+    """Means over the members of a route; times and work of those that arrive."""
+    out = {}
+    for name in ("work", "time", "peak", "length", "mean_force", "largest", "off_track"):
+        x = [t[name] for t in some if t["arrived"] or name in ("mean_force", "peak", "largest", "off_track")]
+        x = [v for v in x if np.isfinite(v)]
+        out[name] = float(np.mean(x)) if x else np.nan
+    return out
+
+
+def numbers(found):
+    """{name: properties} for GeoJSON."""
+    out, v = {}, found.get("verdict") or {}
+    for r in found["routes"]:
+        p = {f"predicted_{k}": x for k, x in r["predicted"].items() if k != "features"}
+        p |= {"label": r["label"], "kind": r["kind"], "speed_m_s": r["speed"]}
+        if r.get("simulated"):
+            p |= {f"simulated_{k}": x for k, x in r["simulated"].items()}
+        if r["name"] in v.get("order", ()):
+            c = v["compared"].get(r["name"], {})
+            p |= {"rank": v["order"].index(r["name"]) + 1, "relative": c.get("relative"),
+                  "relative_95": c.get("relative_95"), "recommended": r["name"] == v["recommended"]}
+        out[r["name"]] = p
+    return out
+
+
+def draw(found, plan, some, s, goal, bold):
+    from bergtow.plot import route as picture
+    shown = [(c.label, c.track, c.tug, c.name == bold) for c in some
+             if not np.isfinite(c.speed) or c.speed == max(x.speed for x in some if np.isfinite(x.speed))]
+    e = plan.cover_extent
+    return picture.figure(f"{found['title']}: routes", words.answer(found), s.place, s.extent, plan.cover,
+                          e, s.ice.outlines, s.no_go, shown, goal)
+
+
+class Files:
+    """What is written, whenever there is more of it."""
+
+    def __init__(self, folder, plan, some, s, goal, force):
+        self.folder, self.plan, self.some, self.s, self.goal, self.force = folder, plan, some, s, goal, force
+
+    def write(self, found, picture=False):
+        folder, place = self.folder, self.s.place
+        writing.write_json(found, folder / "route.json", self.force)
+        output.geojson(self.some, place, numbers(found), folder / "routes.geojson", self.force)
+        if picture:
+            bold = (found.get("verdict") or {}).get("recommended") or (found.get("verdict") or {}).get("straight")
+            writing.save(draw(writing.plain(found), self.plan, self.some, self.s, self.goal, bold),
+                         folder / "route.png", self.force)
+
+    def write_plan(self):
+        for c in self.some:
+            output.case(c, self.folder / "route-base.yml", self.folder / f"{c.name}.yml", self.force)
+        if self.s.place.origin is not None:
+            output.gpx(self.some, self.s.place, self.folder / "routes.gpx", self.force)
+
+
+def estimate(program, s, some, n, jobs):
+    """Seconds of wall time that the tows take, by the estimate of `bergtow check`."""
+    total = 0.0
+    for c in some:
+        keys = situation.reading(s.values, s.field) | c.keys
+        cost = json.loads(checked(program, s.case, [f"{k}={v}" for k, v in keys.items()], "--json"))["cost"]
+        total += cost["core_time_s"] * -(-n // jobs)
+    return total
+
+
+def perform(a):
+    folder = a.output or Path("out") / f"route-{a.case.stem}"
+    if not a.case.exists():
+        raise RunError(a.case, "no such file", "name a case file")
+    for name in FILES:
+        writing.may_write(folder / name, a.force)
+    began, program = time.monotonic(), program_path()
+    place = situation.place_of(a.case, a.set)
+    body = {}
+    if a.start:
+        x, y = situation.position(a.start, place, "--from")
+        body = {"body.x": f"{x:.12g} m", "body.y": f"{y:.12g} m"}
+    goal = situation.goal(a.to, place)
+    case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
+    width = _above(a.width, "m", "--width") if a.width else None
+    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, width)
+    w = wanted(a, s)
+    if w["replan"] and s.mode == "thrust":
+        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new way "
+                       "would change its tow before the look", "set tow.mode to speed or line", USAGE)
+    last = began + 60 * a.budget
+    runs = tows.Tows(case.resolve(), folder, "route", program, [], a.jobs, last, last)
+    found = {"case": a.case.name, "title": s.values["run.title"] or a.case.stem, "status": "ok", "set": a.set,
+             "objective": a.objective, "start": s.start, "goal": goal, "speeds": w["speeds"],
+             "force_limit": w["limit"], "radius": w["radius"], "clearance": w["clearance"], "hull_width": s.hull.width,
+             "floes": len(s.ice.outlines), "drift": s.drift, "map_errors": vars(w["errors"]) | {"assumed": w["assumed"]},
+             "calibration": None, "verdict": None, "rounds": []}
+    with locked(folder / "route") as runs.lock:
+        weights, factor = planner.Weights(), 1.0
+        if a.calibrate and not a.plan_only:
+            weights, factor, found["calibration"] = calibrated(a, w, s, runs)
+        clock = time.monotonic()
+        plan = planned(a, w, s, goal, weights, factor)
+        found |= {"plan_s": time.monotonic() - clock, "states": plan.states, "cell": plan.cell, "spacing": plan.spacing}
+        refuse(plan, found, folder / "route.json", a.force)
+        some = tows.candidates(plan.routes, w["speeds"], s)
+        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c, s) for c in some]}
+        files = Files(folder, plan, some, s, goal, a.force)
+        files.write_plan()
+        files.write(found, picture=True)
+        print(words.plan(writing.plain(found)))
+        if plan.status == "fewer_routes":
+            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one lies a "
+                  "width apart from these.")
+        n = 1 if w["errors"].none else a.members
+        seconds = estimate(program, s, some, n, a.jobs)
+        found["estimate_s"] = seconds
+        print(f"\n{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, rough estimate "
+              f"{words.amount(seconds, 's')} with {a.jobs} at a time\n")
+        if a.plan_only:
+            print(words.answer(writing.plain(found)))
+            print(folder / "route.json")
+            return
+        if w["replan"]:
+            from bergtow.routing import horizon
+            horizon.follow(a, w, s, goal, weights, factor, runs, files, found, plan)
+        else:
+            verify(a, w, s, goal, some, n, runs, files, found)
+
+
+def verify(a, w, s, goal, some, n, runs, files, found):
+    """Tow every candidate through the members, and judge."""
+    folder, began = files.folder, time.monotonic()
+    runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
+    found["left_out"] = [m.left_out for m in runs.members]
+    outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
+    for c in some:
+        why = tow(runs, c.name, range(n), c.keys)
+        if SPENT in why:
+            files.write(found)
+            raise RunError(folder, f"the budget of {a.budget:g} min is spent before every tow is made",
+                           "call again: what is made is kept", IO)
+        if any(why):
+            runs.tell_failed()
+        rows = []
+        for i in range(n):
+            with Run(runs.path(c.name, i)) as run:
+                rows.append(tows.outcome(run, c, goal, s, w["limit"]))
+        outcomes[c.name] = rows
+        by_name[c.name] |= {"members": rows, "simulated": means(rows), "counts": {
+            name: sum(verdict.fault(t, name) for t in rows) for name in (*verdict.FAULTS, "no_load")}}
+        files.write(found)
+    found["verdict"] = verdict.of(some, outcomes, a.objective)
+    found["tows_s"] = time.monotonic() - began
+    files.write(found, picture=True)
+    told = writing.plain(found)
+    print(f"\n{words.verified(told)}\n\n{words.meaning(told)}\n\n{words.answer(told)}\n")
+    v = found["verdict"]
+    shown = [(by_name[name]["label"], runs.path(name, 0)) for name in
+             dict.fromkeys(x for x in (v["recommended"] or v["chosen"], v["straight"]) if x)]
+    page(a, found, shown, folder)
+
+
+def page(a, found, shown, folder):
+    """The page with two tows beside each other: [(heading, folder of the tow)]."""
+    print(folder / "route.json")
+    if a.no_page:
+        return
+    from bergtow.reporting import side_by_side
+    picture = base64.b64encode((folder / "route.png").read_bytes()).decode("ascii")
+    told = writing.plain(found)
+    side_by_side.write(f"{told['title']}: routes", words.text(told), picture, shown, folder / "route.html", a.force)

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: MIT
+"""What a route is planned on: the floes, the hull, the water and the areas to keep out of, as the program has them.
+
+The floes are those of the run: the field that `bergtow field` writes, and the bodies of a Simulation of the case that
+reads it, floes given by hand and fixed ones included. Nothing of the ice is made in Python.
+"""
+import json
+import subprocess
+from ctypes import byref, c_double
+from dataclasses import dataclass
+from pathlib import Path
+
+from bergtow import _library, writing
+from bergtow._calls import Calls
+from bergtow.case import Case
+from bergtow.errors import CASE, USAGE, Refused, RunError
+from bergtow.routing import planner
+from bergtow.simulation import Simulation
+from bergtow.study.case_file import files
+from bergtow.study.runs import errors_in, is_file
+
+import numpy as np
+
+FIXED = 2  # bt_simulation: a body at rest for ever
+GRAVITY = 9.81  # m/s2
+LOCAL = "urn:x-bergtow:crs:local-metres-east-north"
+#: keys of the tow that a route says itself
+OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
+
+
+# ---- positions
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where x = y = 0 of a case lies on the earth, and which way its axes point. origin: longitude and latitude, rad,
+    or None: nowhere."""
+
+    north_first: bool    #: the geographic frame: x north, y east
+    origin: tuple = None
+
+    def map(self, xy):
+        """[n, 2] metres east and north of metres of the case; its own inverse."""
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        return xy[:, ::-1] if self.north_first else xy
+
+    def degrees(self, xy):
+        """[n, 2] longitude and latitude of metres of the case."""
+        lib, lon, lat, out = _library.library(), c_double(), c_double(), []
+        for east, north in self.map(xy):
+            lib.bt_outline_unproject(c_double(north), c_double(east), *map(c_double, self.origin), byref(lon),
+                                     byref(lat))
+            out.append(np.degrees([lon.value, lat.value]))
+        return np.array(out).reshape(-1, 2)
+
+    def metres(self, degrees):
+        """Metres of the case, [n, 2], of longitude and latitude."""
+        lib, north, east, out = _library.library(), c_double(), c_double(), []
+        for lon, lat in np.radians(np.asarray(degrees, dtype=float).reshape(-1, 2)):
+            lib.bt_outline_project(c_double(lon), c_double(lat), *map(c_double, self.origin), byref(north),
+                                   byref(east))
+            out.append((east.value, north.value))
+        return self.map(out)
+
+
+def number(text, unit, option):
+    """A number with a unit, as the program reads it. Errors: RunError."""
+    value = c_double()
+    try:
+        _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
+    except Exception as error:
+        raise RunError(option, str(error), "write metres of the case as X,Y, or degrees as 20.1E,76.5N", USAGE) from None
+    return value.value
+
+
+def position(text, place, option):
+    """(x, y) in m of the case from "X,Y" with any unit of length, or from degrees, "20.1E,76.5N". Errors: RunError."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 2:
+        raise RunError(f"{option} {text}", "is no position", "write it as X,Y in metres of the case, or as degrees, "
+                       "20.1E,76.5N", USAGE)
+    sides = [part[-1:].upper() for part in parts]
+    if {*sides} & {*"NESW"}:
+        if not ({*sides} & {*"EW"} and {*sides} & {*"NS"}):
+            raise RunError(f"{option} {text}", "is no place on the earth", "write a longitude and a latitude, as in "
+                           "20.1E,76.5N", USAGE)
+        if place.origin is None:
+            raise RunError(f"{option} {text}", "is in degrees, and the map of this case has no place",
+                           "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, or write metres of the case",
+                           USAGE)
+        values = dict(zip(sides, (number(part[:-1], "", option) for part in parts)))
+        degrees = [values.get("E", -values.get("W", 0.0)), values.get("N", -values.get("S", 0.0))]
+        if abs(degrees[0]) > 360 or abs(degrees[1]) > 90:
+            raise RunError(f"{option} {text}", "is no place on the earth", "longitudes go to 180, latitudes to 90",
+                           USAGE)
+        return tuple(map(float, place.metres([degrees])[0]))
+    return tuple(number(part, "m", option) for part in parts)
+
+
+def goal(text, place):
+    """A point, or two of a line at any point of which the tow may end, "X,Y:X,Y". Errors: RunError."""
+    ends = [position(part, place, "--to") for part in text.split(":")]
+    if len(ends) > 2 or len(ends) == 2 and ends[0] == ends[1]:
+        raise RunError(f"--to {text}", "is neither a point nor a line", "write X,Y or X,Y:X,Y", USAGE)
+    return ends[0] if len(ends) == 1 else tuple(ends)
+
+
+def no_go_file(path, place):
+    """Polygons [n, 2] in m of the case from GeoJSON: degrees, or metres where its crs is the program's own. Holes
+    count as land. Errors: RunError."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+        features = found["features"] if found.get("type") == "FeatureCollection" else [found]
+        geometries = [f.get("geometry", f) for f in features]
+        rings = [polygon[0] for g in geometries
+                 for polygon in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
+        if any(g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
+            raise ValueError("a geometry is no polygon")
+        rings = [np.asarray(ring, dtype=float)[:, :2] for ring in rings]
+        crs = found.get("crs", {}).get("properties", {}).get("name", "")
+    except OSError as error:
+        raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise RunError(path, f"is no GeoJSON of polygons ({error})", "write Polygon or MultiPolygon features, in "
+                       "degrees", CASE) from None
+    if crs not in ("", LOCAL) and not crs.upper().endswith("CRS84"):
+        raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
+                       f"east and north of x = y = 0 the crs {LOCAL}", CASE)
+    if crs != LOCAL and place.origin is None:
+        raise RunError(path, "is in degrees, and the map of this case has no place", "set ice.origin_lon and "
+                       f"ice.origin_lat, or give the file metres and the crs {LOCAL}", CASE)
+    return [place.map(ring) if crs == LOCAL else place.metres(ring) for ring in rings]
+
+
+# ---- the case
+
+
+def own_case(path, sets, values, folder, map_file=None, force=False):
+    """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a route
+    says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the user says
+    of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
+    merged = {}
+    for file, some in reversed(files(path)):
+        some = {k: v for k, v in some.items() if k != "base"}
+        for name, section in _rebased(some, file.parent).items():
+            old = merged.get(name)
+            merged[name] = _merged(old, section) if isinstance(old, dict) and isinstance(section, dict) else section
+    given = [text.partition("=")[::2] for text in sets]
+    if map_file is not None:
+        for key in ("field", "outlines"):
+            merged.get("ice", {}).pop(key, None)
+        kind = {".h5": "field", ".geojson": "outlines", ".json": "outlines"}.get(map_file.suffix.lower())
+        if kind is None:
+            raise RunError(map_file, "is neither a field nor outlines",
+                           "make outlines of it with `bergtow outlines`, and name the .geojson", USAGE)
+        if not map_file.is_file():
+            raise RunError(map_file, "no such file", "name a field (.h5) or outlines (.geojson) with --map")
+        given.append((f"ice.{kind}", str(map_file.resolve())))
+        idle = MADE + (BESIDE_FIELD if kind == "field" else ())
+        merged["ice"] = {k: v for k, v in merged.get("ice", {}).items() if k not in idle}
+    for key, value in [*given, *values.items()]:
+        node, (*parents, last) = merged, key.strip().split(".")
+        for name in parents:
+            node = node.setdefault(name, {})
+        value = value.strip()
+        node[last] = str((path.parent / value).resolve()) if is_file(path.parent, value) else value
+    ramp = merged.get("tow", {}).get("ramp")
+    for key in OWN:
+        merged.get("tow", {}).pop(key, None)
+    out = folder / "route-base.yml"
+    text = f"# {path.name} without the way of the tow, which each route says; {writing.MARK}\n"
+    writing.write_text(text + json.dumps(merged, indent=1, ensure_ascii=False) + "\n", out, force)
+    return out, ramp
+
+
+#: keys of the ice that have no effect where it is read
+MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
+        "size_exponent", "shake", "extent", "seed")
+#: beside a field, too
+BESIDE_FIELD = ("thickness", "thickness_law", "thickness_spread", "x_min", "x_max", "y_min", "y_max", "outlines_crs")
+
+
+def _merged(old, new):
+    out = dict(old)
+    for key, value in new.items():
+        out[key] = _merged(out[key], value) if isinstance(value, dict) and isinstance(out.get(key), dict) else value
+    return out
+
+
+def _rebased(node, folder):
+    """Names of files as absolute ones."""
+    if isinstance(node, dict):
+        return {key: _rebased(below, folder) for key, below in node.items()}
+    if isinstance(node, list):
+        return [_rebased(below, folder) for below in node]
+    if isinstance(node, str) and is_file(folder, node):
+        return str((folder / node).resolve())
+    return node
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A case before its tow."""
+
+    case: Path            #: route-base.yml, without the way of the tow
+    field: Path           #: the floes, as `bergtow field` has written them
+    values: Case          #: every key
+    place: Place
+    ice: planner.Ice
+    hull: planner.Hull
+    mass: float           #: of the body with its added mass, kg
+    outline: np.ndarray   #: [n, 2] of the hull, m from its centroid, at yaw 0
+    start: tuple          #: (x, y), m
+    extent: tuple         #: (x0, y0, x1, y1), m
+    no_go: list           #: polygons [n, 2], m: of --no-go, and fixed floes
+    drift: tuple          #: mean velocity of the floes, m/s
+    water: tuple          #: of the water, m/s
+    ramp: float           #: tow.ramp, s
+    moving: np.ndarray    #: numbers of the floes that are not fixed
+
+    @property
+    def mode(self):
+        return self.values["tow.mode"]
+
+    @property
+    def line(self):
+        """From the centroid of the body to the towing end, m: the line and the arm of its fastening; 0 where the body
+        itself is led."""
+        v = self.values
+        return 0.0 if self.mode == "speed" else v["tow.line_length"] + np.hypot(v["tow.hull_x"], v["tow.hull_y"])
+
+
+def field(program, case, folder):
+    """FOLDER/ice.h5, the floes of a case. Errors: RunError in the program's words."""
+    folder.mkdir(parents=True, exist_ok=True)
+    out = folder / "ice.h5"
+    code, said = Calls().run([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
+    if code:
+        raise Refused(case, "\n".join(errors_in(said)) or "the field is refused", code)
+    return out
+
+
+def reading(case, file):
+    """{key: value} with which a case reads its floes from a field file."""
+    return {"ice.field": str(file)} | ({"ice.outlines": "none"} if case["ice.outlines"] else {})
+
+
+def checked(values):
+    """A case through whose ice a route can be planned. Errors: RunError."""
+    mode = values["tow.mode"]
+    if mode == "none" or values["body.shape"] == "none":
+        raise RunError("tow.mode", "nothing is towed in this case", "set body.shape, and tow.mode to speed, line or "
+                       "thrust", CASE)
+    if values["domain.ends"] in ("moving", "periodic"):
+        raise RunError("domain.ends", f"{values['domain.ends']} ends bring the same ice again and again, which is no "
+                       "map", "set domain.ends to open or wall", CASE)
+
+
+def place_of(path, sets):
+    """The Place of a case. Errors: CaseError."""
+    return _place(Case(path, dict(text.partition("=")[::2] for text in sets)))
+
+
+def _place(values):
+    origin = values["ice.origin_lon"], values["ice.origin_lat"]
+    return Place(values["domain.frame"] == "geographic", None if None in origin else origin)
+
+
+def of(program, case, folder, ramp=None, no_go=(), width=None):
+    """The Situation of a case. no_go: files; width: of the hull across its path, m, None: its mean over all headings.
+    Errors: RunError, CaseError."""
+    values = Case(case)
+    checked(values)
+    place = _place(values)
+    areas = [polygon for file in no_go for polygon in no_go_file(file, place)]
+    field_file = Path(case.parent, values["ice.field"]) if values["ice.field"] else field(program, case, folder)
+    with Simulation(Case(case, reading(values, field_file)), threads=1) as sim:
+        body, motion, ice = sim.towed, sim.motions, sim.thicknesses > 0
+        outlines = [sim.outline(i) for i in range(sim.n_bodies)]
+        floes = np.flatnonzero(ice & (motion != FIXED))
+        fixed = [outlines[i] for i in np.flatnonzero((motion == FIXED) & ice)]
+        (skin, form), mass = sim.drags[body, :2], sim.masses[body, 0]
+        start, radius = sim.positions[body], sim.radii[body]
+        drift = sim.velocities[floes, :2].mean(axis=0) if len(floes) else np.zeros(2)
+        thickness = sim.thicknesses[floes]
+        water = _water(values, sim)
+    hull = outlines[body] - start[:2]
+    # the mean width of a convex outline over all headings is its perimeter over pi (Cauchy)
+    across = width or np.sum(np.hypot(*(np.roll(hull, -1, 0) - hull).T)) / np.pi
+    density, kappa = values["ice.density"], values["ice.rafting.kappa"]
+    rafting = 0.5 * kappa * density * (1 - density / values["water.density"]) * GRAVITY if kappa > 0 else np.inf
+    c, s = np.cos(start[2]), np.sin(start[2])
+    x0, y0 = values["domain.x0"], values["domain.y0"]
+    return Situation(
+        case=case, field=field_file, values=values, place=place,
+        ice=planner.Ice(outlines=[outlines[i] for i in floes], thickness=thickness, density=density,
+                        added_mass=values["ice.added_mass"], rafting=rafting),
+        hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), mass=mass,
+        outline=hull @ np.array([[c, -s], [s, c]]),
+        start=tuple(map(float, start[:2])),
+        extent=(x0, y0, x0 + values["domain.length"], y0 + values["domain.width"]), no_go=areas + fixed,
+        drift=tuple(map(float, drift)), water=water,
+        ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"],
+        moving=floes)
+
+
+def _water(values, sim):
+    """Velocity of the water at the start, m/s."""
+    if not (values["water.current_table"] or values["water.tide.major"]):
+        return values["water.current_x"], values["water.current_y"]
+    sim.step(1)
+    return sim["current_x"], sim["current_y"]

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""Routes as cases, their tows through the members of the map, and what each tow says.
+
+A route is a case of its own: the way of the body (tow.mode speed) or of the towing end, tow.speed or tow.programme, and
+run.duration. In a steady turn the line bears the drag F along the way and the centripetal force across it, so that it
+leads inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m that added mass is part of and the
+curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end goes where that puts it, at body + L (cos(delta) t +
+sin(delta) n): of a light body the inverse of the tractrix. kappa is smoothed over the length of the line, for a body
+cannot follow a jump of it; what the tow makes of that the simulation shows. Rejected: the tractrix alone, with which
+an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
+
+The goal is reached where the body comes within ARRIVED of its width, at the moment in which it is nearest; every number
+of a tow is of the time up to there, or to its end where the goal is missed.
+"""
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bergtow.errors import CASE, RunError
+from bergtow.result.run import least
+from bergtow.routing import apart
+from bergtow.study.runs import CaseRuns
+
+import numpy as np
+
+ARRIVED = 1.0        # body widths from the goal
+LONGER = {"speed": 1.05, "line": 1.15, "thrust": 1.6}  # run.duration / the predicted time; a vessel may be held up
+PEAK = 99            # percentile of the step means that counts as peak
+STRAIGHT = 5e-3      # body widths: what a polyline may be off a way
+FRAMES = 150         # of the one tow of a route that a page replays
+TOUCH = 1e-3         # body widths: contact with an area to keep out of
+
+
+@dataclass
+class Candidate:
+    """A route at one speed, or at the speeds of its legs."""
+
+    name: str
+    label: str
+    route: object        #: planner.Route
+    speed: float         #: m/s, NaN: by legs
+    keys: dict = field(default_factory=dict)  #: of its case, as texts
+    track: np.ndarray = None                  #: [m, 2] of the body over the ground, as planned, m
+    tug: np.ndarray = None                    #: [m, 2] of the towing end, or None
+    points: np.ndarray = None                 #: [k, 2] way-points of the case, m
+
+    @property
+    def straight(self):
+        return self.route.kind == "straight"
+
+
+def simplified(xy, off):
+    """The fewest points of a polyline [n, 2] that stay within `off` of it (Douglas & Peucker 1973)."""
+    keep, stack = {0, len(xy) - 1}, [(0, len(xy) - 1)]
+    while stack:
+        i, j = stack.pop()
+        if j - i < 2:
+            continue
+        a, edge = xy[i], xy[j] - xy[i]
+        rel = xy[i + 1:j] - a
+        t = np.clip(rel @ edge / max(edge @ edge, 1e-300), 0, 1)
+        far = np.hypot(*(rel - t[:, None] * edge).T)
+        if far.max() > off:
+            k = i + 1 + int(far.argmax())
+            keep.add(k)
+            stack += [(i, k), (k, j)]
+    return xy[sorted(keep)]
+
+
+def pairs(points):
+    return "[" + ", ".join(f"[{a:.10g}, {b:.10g}]" for a, b in points) + "]"
+
+
+def programme(legs, ramp):
+    """[(time s, speed m/s)] of a tow that is as fast as its legs say: from rest, and from leg to leg in the share of
+    the ramp that the change of speed is of the largest one."""
+    speeds, lengths = legs["speed"].astype(float), legs["length"].astype(float)
+    top, out, time, at = speeds.max(), [(0.0, 0.0)], 0.0, 0.0
+    for v, length in zip(speeds, lengths):
+        change = ramp * abs(v - at) / top
+        way = change * (v + at) / 2
+        if change > 0:
+            time += change
+            out.append((time, v))
+        time += max(length - way, 0.01 * length) / v
+        out.append((time, v))
+        at = v
+    return out
+
+
+def tug_track(route, situation):
+    """[m, 2] of the towing end in the frame of the ice."""
+    s = situation
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
+    new = np.append(True, np.diff(way) > 1e-9 * way[-1])
+    way, x, y, heading = way[new], route.x[new], route.y[new], np.unwrap(route.heading)[new]
+    # curvature averaged over two lengths of the line with the weights of a triangle: a difference of means of the heading
+    area = np.append(0.0, np.cumsum(np.diff(way) * (heading[1:] + heading[:-1]) / 2))
+
+    def whole(at):  # of the heading, which goes on as it begins and ends
+        inside = np.clip(at, 0, way[-1])
+        return (np.interp(inside, way, area) + np.minimum(at, 0) * heading[0] +
+                np.maximum(at - way[-1], 0) * heading[-1])
+    turn = (whole(way + s.line) - 2 * whole(way) + whole(way - s.line)) / s.line
+    force = max(route.force, s.hull.drag * route.length ** 2 / route.duration ** 2)
+    speed = route.length / route.duration
+    delta = np.arctan(s.mass * (turn / s.line) * speed ** 2 / force) if s.line > 0 else 0.0 * way
+    return np.column_stack([x + s.line * np.cos(heading + delta), y + s.line * np.sin(heading + delta)]), new
+
+
+def candidate(name, label, route, speed, situation):
+    """The case of a route; speed: m/s, NaN: as its legs have it."""
+    s = situation
+    by_legs = not np.isfinite(speed)
+    time = route.time if by_legs else np.append(0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y)))) / speed
+    moved = np.outer(time, s.drift)
+    body = np.column_stack([route.x, route.y]) + moved
+    c = Candidate(name, label, route, speed, {}, body)
+    if s.mode == "speed":
+        corners, radii = np.asarray(route.waypoints), np.asarray(route.radii)
+        if any(s.drift):
+            nearest = [int(np.argmin(np.hypot(route.x - x, route.y - y))) for x, y in corners]
+            corners, radii = corners + moved[nearest], 0.8 * radii
+        turns = radii[:-1][radii[:-1] > 0]
+        c.points = corners
+        c.keys = {"tow.waypoints": pairs(corners)} | ({"tow.turn_radius": f"{0.999 * turns.min():.10g} m"}
+                                                      if len(turns) else {})
+    else:
+        c.tug, new = tug_track(route, s)
+        c.tug += moved[new]
+        c.points = simplified(c.tug, STRAIGHT * s.hull.width)[1:]
+        c.keys = {"tow.waypoints": pairs(c.points)}
+    if by_legs:
+        points = programme(route.legs, s.ramp)
+        total = points[-1][0]
+        c.keys["tow.programme"] = pairs(points)
+    else:
+        total = route.length / speed + s.ramp / 2
+        c.keys |= {"tow.speed": f"{speed:.10g} m/s", "tow.ramp": f"{s.ramp:.10g} s"}
+    dt = s.values["run.dt"]
+    c.keys["run.duration"] = f"{dt * np.ceil(LONGER[s.mode] * total / dt):.10g} s"
+    c.keys["output.window_start"] = "-1 s"
+    return c
+
+
+def candidates(routes, speeds, situation):
+    """Every route at every speed, and at those of its legs where they differ."""
+    out, k = [], 0
+    for route in routes:
+        k += route.kind != "straight"
+        name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
+        for speed in speeds:
+            more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
+            out.append(candidate(name + more[0], label + more[1], route, speed, situation))
+        if len(set(route.legs["speed"].tolist())) > 1:
+            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, np.nan, situation))
+    return out
+
+
+# ---- runs
+
+
+@dataclass
+class Tows(CaseRuns):
+    """Tows of candidates through members, which take the place of fields."""
+
+    members: list = field(default_factory=list)
+
+    def sets(self, i, values):
+        member = self.members[i].keys if self.members else {}
+        frames = -1.0 if i else float(values["run.duration"].split()[0]) / FRAMES
+        texts = member | {"output.frame_interval": f"{frames:.10g} s"} | values
+        return [*self.given, *(f"{key}={text}" for key, text in texts.items())]
+
+    def stamp(self, i, values):
+        texts = self.sets(i, values)
+        read = next((t.partition("=")[2] for t in texts if t.startswith("ice.field=")), None)
+        return [self.identity, *([hashlib.sha256(Path(read).read_bytes()).hexdigest()] if read else []), *texts]
+
+    def refuse_copies(self, name, fields):
+        """Members may well be alike: in open water all are."""
+
+
+# ---- what a tow says
+
+
+def to_goal(xy, goal):
+    """[n] distance of points to the goal, a point or a line."""
+    a = np.atleast_2d(np.asarray(goal, dtype=float))
+    if len(a) == 1:
+        return np.hypot(*(xy - a[0]).T)
+    edge = a[1] - a[0]
+    t = np.clip((xy - a[0]) @ edge / (edge @ edge), 0, 1)
+    return np.hypot(*(xy - a[0] - t[:, None] * edge).T)
+
+
+def arrival(xy, goal, within):
+    """Index of the sample at which the goal is reached, None where it is missed."""
+    distance = to_goal(xy, goal)
+    near = np.flatnonzero(distance <= within)
+    if not len(near):
+        return None
+    first = near[0]
+    away = np.flatnonzero(distance[first:] > within)
+    stay = distance[first:first + away[0]] if len(away) else distance[first:]
+    return int(first + np.argmin(stay))
+
+
+def outcome(run, c, goal, situation, force_limit=np.inf):
+    """{name: number} of a tow. Errors: RunError."""
+    s, time = situation, run["time"]
+    if len(time) < 2:
+        raise RunError(run.path, "holds no series", "make run.dt shorter", CASE)
+    xy = np.column_stack([run["body_x"], run["body_y"]])
+    end = arrival(xy, goal, ARRIVED * s.hull.width)
+    n = len(time) if end is None else end + 1
+    step = np.diff(np.vstack([s.start, xy[:n]]), axis=0)
+    dt = np.diff(np.append(0.0, time[:n]))
+    force = least(run["tow_force" if s.mode == "speed" else "line_tension"])[:n]
+    along = np.hypot(*step.T)
+    if s.mode != "speed":
+        line = np.column_stack([run["carriage_x"], run["carriage_y"]])[:n] - xy[:n]
+        along = np.sum(step * line, axis=1) / np.hypot(*line.T)
+    there = np.isfinite(force) & np.isfinite(along)  # not once the line has parted
+    work = float(np.sum((force * along)[there]))
+    steady = there & (time[:n] > s.ramp)
+    some = force[steady if steady.any() else there]
+    peak = float(np.percentile(some, PEAK)) if len(some) else np.nan
+    body = np.column_stack([xy, run["body_yaw"]])[:n]
+    off = apart.to_edges(xy[:n], np.vstack([c.track, c.track[::-1]]))
+    touch = apart.least(body, s.outline, s.no_go, TOUCH * s.hull.width)
+    return {
+        "arrived": end is not None, "time": float(time[n - 1]) if end is not None else np.nan,
+        "work": work, "length": float(np.sum(np.hypot(*step.T))), "peak": peak,
+        "largest": float(np.max(force[there])) if there.any() else np.nan,
+        "mean_force": float(np.sum((force * dt)[there]) / np.sum(dt[there])) if there.any() else np.nan,
+        "limit_exceeded": bool(peak > force_limit), "slack": bool(s.mode != "speed" and np.any(some <= 0)),
+        "parted": any(e["kind"] == "line_broken" for e in run.events),
+        "no_go_contact": bool(touch <= TOUCH * s.hull.width), "off_track": float(off.max()),
+        "missed_by": float(to_goal(xy, goal).min()), "no_load": bool(np.isnan(run["ice_resistance"][:n]).any()),
+        "hash": str(run.summary.get("state_hash")), "wall_s": run.number("wall_time_s"),
+    }

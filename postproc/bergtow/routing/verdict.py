@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Which route is better than the straight line, and whether that is shown.
+
+The best of several looks better than it is, in the very members by which it was found to be the best. So one half of the
+members chooses, and the other half judges: the interval is of the paired differences to the straight line in members
+that had no part in the choice. A tow fails where it misses the goal, touches an area to keep out of, parts its line, or
+exceeds the limit of force; tows are ranked by their failures first, and by the mean of the objective then.
+"""
+from bergtow.stats.mean import LEVEL, t_interval
+
+import numpy as np
+import scipy.stats
+
+FAULTS = ("missed", "no_go_contact", "limit_exceeded", "parted", "slack")
+FAILURES = FAULTS[:-1]  #: a slack line is said, and no failure
+
+
+def halves(n):
+    """(members that choose, members that judge); a single one does both."""
+    return (range(n), range(n)) if n < 2 else (range(n // 2), range(n // 2, n))
+
+
+def fault(tow, name):
+    return not tow["arrived"] if name == "missed" else tow[name]
+
+
+def fails(tow):
+    return any(fault(tow, name) for name in FAILURES)
+
+
+def value(tow, objective):
+    """Of the objective; NaN where the tow fails to arrive, for it was not made."""
+    return tow[objective] if tow["arrived"] else np.nan
+
+
+def rank(tows, some, objective):
+    """To sort by: failures, then the mean of the objective."""
+    values = [value(tows[i], objective) for i in some]
+    known = [v for v in values if np.isfinite(v)]
+    return sum(fails(tows[i]) for i in some), np.mean(known) if known else np.inf
+
+
+def compared(tows, straight, some, objective):
+    """Paired differences of the objective to the straight line, and of the failures, over some members."""
+    a, b = (np.array([value(t[i], objective) for i in some]) for t in (tows, straight))
+    both = np.isfinite(a) & np.isfinite(b)
+    d = a[both] - b[both]
+    low, high = t_interval(d)
+    mean = float(d.mean()) if len(d) else np.nan
+    base = float(b[both].mean()) if both.any() else np.nan
+    better = sum(fails(straight[i]) and not fails(tows[i]) for i in some)
+    worse = sum(fails(tows[i]) and not fails(straight[i]) for i in some)
+    # sign test of the members in which one fails and the other does not
+    chance = float(scipy.stats.binom.sf(better - 1, better + worse, 0.5)) if better + worse else 1.0
+    return {"pairs": int(both.sum()), "difference": mean, "difference_95": [float(low), float(high)],
+            "relative": mean / base, "relative_95": [float(low) / base, float(high) / base],
+            "fails_less": better, "fails_more": worse, "chance_of_fails": chance}
+
+
+def shown(c):
+    """Is it shown that this route is better?"""
+    if c["fails_less"] > c["fails_more"]:
+        return c["chance_of_fails"] <= (1 - LEVEL) / 2
+    return c["fails_more"] == 0 and bool(c["difference_95"][1] < 0)
+
+
+def of(candidates, outcomes, objective):
+    """The verdict. candidates: [Candidate]; outcomes: {name: [tow of each member]}. `code`: better, not_shown,
+    one_member, straight_not_passable, no_route."""
+    n = len(next(iter(outcomes.values())))
+    choose, judge = halves(n)
+    order = sorted(candidates, key=lambda c: (rank(outcomes[c.name], choose, objective), c.name))
+    lines = [c for c in order if c.straight and not set(c.route.faults) & {"no_go", "outside"}]
+    others = [c for c in order if not c.straight]
+    out = {"members": n, "chose": [i + 1 for i in choose], "judged": [i + 1 for i in judge],
+           "order": [c.name for c in order], "straight": lines[0].name if lines else None,
+           "chosen": others[0].name if others else None, "recommended": None, "compared": {}}
+    if not others:
+        return out | {"code": "no_route"}
+    if not lines:
+        passable = not any(fails(outcomes[others[0].name][i]) for i in judge)
+        return out | {"code": "straight_not_passable", "recommended": others[0].name if passable else None}
+    straight = outcomes[lines[0].name]
+    out["compared"] = {c.name: compared(outcomes[c.name], straight, judge, objective) for c in order}
+    first = next(c for c in candidates if not c.straight)
+    values = [(value(outcomes[first.name][i], objective), value(straight[i], objective)) for i in range(n)]
+    out["planner_best"] = {"name": first.name, "members": n,
+                           "lost": sum(np.isfinite(b) and not a <= b for a, b in values)}
+    if n < 2:
+        return out | {"code": "one_member"}
+    better = shown(out["compared"][others[0].name])
+    return out | {"code": "better" if better else "not_shown", "recommended": others[0].name if better else None}

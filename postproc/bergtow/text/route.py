@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""What bergtow route found, as tables and sentences. found: as route.json has it."""
+from bergtow.table import number, quantity, table
+
+UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
+WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak force", "length": "length of the way"}
+FAULTS = {"missed": "misses the goal", "no_go_contact": "touches an area to keep out of",
+          "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
+          "no_load": "has a load without bound in some steps"}
+PLANNED = {"no_go": "crosses an area to keep out of", "outside": "leaves the domain",
+           "force_limit": "exceeds the force limit by prediction"}
+
+
+def amount(x, unit):
+    if x is None:
+        return "–"
+    if unit == "s":
+        return f"{number(x)} s" if x < 7200 else f"{number(x / 3600)} h"
+    return quantity(x, unit)
+
+
+def plan(found, markdown=False):
+    """The routes as planned."""
+    head = ["route", "length", "time", "ice in the swath", "mean force", "work", "remarks"]
+    rows = []
+    for r in found["routes"]:
+        p = r["predicted"]
+        rows.append([r["label"], amount(p["length"], "m"), amount(p["time"], "s"), f"{number(p['ice_area'])} m2",
+                     amount(p["mean_force"], "N"), amount(p["work"], "J"),
+                     "; ".join(PLANNED[f] for f in r["faults"]) or "–"])
+    return table(head, rows, markdown)
+
+
+def percent(x):
+    return "–" if x is None else f"{100 * x:+.1f} %"
+
+
+def verified(found, markdown=False):
+    """The tows against the straight line."""
+    verdict, unit = found["verdict"], UNITS[found["objective"]]
+    head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak", "time",
+            "remarks"]
+    rows = []
+    by_name = {r["name"]: r for r in found["routes"]}
+    for name in verdict["order"]:
+        r, c = by_name[name], verdict["compared"].get(name)
+        s = r["simulated"]
+        against = "–"
+        if name == verdict["straight"]:
+            against = "is it"
+        elif c and c["relative"] is not None:
+            low, high = c["relative_95"]
+            against = percent(c["relative"]) + ("" if low is None else f" ({percent(low)} to {percent(high)})")
+        said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n]
+        rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
+                     amount(s["peak"], "N"), amount(s["time"], "s"), "; ".join(said) or "–"])
+    return table(head, rows, markdown)
+
+
+def answer(found):
+    """The sentence."""
+    v, by_name = found.get("verdict"), {r["name"]: r for r in found["routes"]}
+    if v is None:
+        return "Planned, not towed: no number here is of a simulation."
+    code, objective = v["code"], WORDS[found["objective"]]
+    chosen = by_name.get(v["chosen"], {}).get("label")
+    c = v["compared"].get(v["chosen"])
+    if code == "better":
+        low, high = c["relative_95"]
+        if c["fails_less"]:
+            return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in which "
+                    f"{chosen} does not.")
+        return (f"Take {chosen}: {objective} {percent(c['relative'])} against the straight line, "
+                f"{percent(low)} to {percent(high)} at 95 %.")
+    if code == "straight_not_passable":
+        return (f"The straight line cannot be towed; {chosen} " +
+                ("reaches the goal in every member that judged." if v["recommended"] else
+                 "does not reach the goal in every member either, and is not recommended."))
+    if code == "no_route":
+        return "No route other than the straight line was found."
+    if code == "one_member":
+        much = f"{chosen} has {percent(c['relative'])} of {objective}" if c and c["relative"] is not None else \
+            f"{chosen} cannot be compared with it"
+        return (f"No route shown better than the straight line: there is one member, and no interval ({much} in it). "
+                "If the map is perfect, that is the answer; take --members and errors of the map for one that counts.")
+    return f"No route shown better than the straight line: {objective} of {chosen} {interval(c)}."
+
+
+def interval(c):
+    if c is None or c["relative"] is None:
+        return "cannot be compared, since one of the two fails"
+    low, high = c["relative_95"]
+    return f"is {percent(c['relative'])}, {percent(low)} to {percent(high)} at 95 %"
+
+
+def meaning(found):
+    """How the numbers came about."""
+    v, e = found["verdict"], found["map_errors"]
+    if v["members"] < 2:
+        members = "One member: the map as it is, without errors. "
+    else:
+        members = (f"{v['members']} members of the map, with errors (standard deviations) of {number(e['position'])} m "
+                   f"in position, {number(100 * e['thickness'])} % in thickness and {number(e['drift'])} m/s in drift"
+                   f"{' (assumed)' if e['assumed'] else ''}, the same for every route. "
+                   f"Members {span(v['chose'])} chose, members {span(v['judged'])} judged: the intervals are theirs. ")
+    best = v.get("planner_best")
+    lost = f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. " \
+        if best else ""
+    c = found.get("calibration")
+    fit = "" if not c else calibration(c) + " "
+    return members + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
+
+
+def span(numbers):
+    return f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+
+
+def calibration(c):
+    poor = "; the cost ranks this ice poorly, and the tows alone decide" if c["poor"] else ""
+    return (f"Cost fitted to {c['swaths']} straight swaths: R² {number(c['r2'])}, rank correlation "
+            f"{number(c['rank_correlation'])}{poor}.")
+
+
+def text(found, markdown=False):
+    parts = [plan(found, markdown)]
+    if found.get("verdict"):
+        parts += [verified(found, markdown), meaning(found)]
+    if found.get("rounds"):
+        parts.append(rounds(found, markdown))
+    return "\n\n".join([*parts, answer(found)])
+
+
+def rounds(found, markdown=False):
+    """The receding horizon."""
+    h = found["horizon"]
+    head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
+    rows = [[amount(r["time"], "s"), amount(h["age"], "s"), amount(r["length"], "m"), amount(r["work"], "J"),
+             r["status"]] for r in found["rounds"]]
+    names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
+    told = "; ".join(f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}"
+                     f"{'' if t['arrived'] else ' (goal missed)'}" for k, t in h["tows"].items())
+    bound = ("The looks are perfect: what is gained is an upper bound. " if h["perfect"] else "")
+    return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: {told}. " \
+           f"{bound}One tow is one sample, and has no interval."

@@ -1,0 +1,480 @@
+# SPDX-License-Identifier: MIT
+"""bergtow route around its planner: positions, members of a map, routes as cases, the towed circle, an honest choice,
+what is kept through a kill, and the receding horizon."""
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed, environment, run, script, write_case
+
+import bergtow
+from bergtow.errors import RunError
+from bergtow.result.run import Run
+from bergtow.routing import apart, members, situation, tows, verdict
+
+BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
+                body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
+QUICK = "--to", "8.5,0.3", "--routes", "2", "--members", "4", "--jobs", "2"
+
+
+@pytest.fixture(scope="module")
+def routed(tmp_path_factory):
+    """A call, and its folder."""
+    folder = tmp_path_factory.mktemp("route")
+    done = script("route", write_case(folder, BASIN), *QUICK, "-o", folder / "out")
+    assert done.returncode == DONE, done.stderr
+    return SimpleNamespace(folder=folder, out=folder / "out", said=done.stdout,
+                           found=json.loads((folder / "out/route.json").read_text()))
+
+
+def read_situation(folder, case, **more):
+    return situation.of(BERGTOW, write_case(folder, case), folder / "work", **more)
+
+
+# ---- positions
+
+
+def test_degrees_are_those_of_the_program(tmp_path):
+    """Against the floes that `bergtow field` writes in degrees. Red: axes swapped; another radius of the earth."""
+    case = ROOT / "cases/outlines/outlines.yml"
+    call("field", case, "-o", tmp_path / "f.geojson")
+    call("field", case, "-o", tmp_path / "f.h5")
+    floes, place = members.Floes.read(tmp_path / "f.h5").outlines(), situation.place_of(case, [])
+    for feature, floe in zip(json.loads((tmp_path / "f.geojson").read_text())["features"], floes):
+        ring = np.array(feature["geometry"]["coordinates"][0][:-1])
+        own = place.degrees(floe)
+        far = np.abs(own[:, None] - ring).max(axis=2).min(axis=1)
+        assert far.max() < 1e-8  # a millimetre
+        assert np.allclose(place.metres(own), floe, atol=1e-6)
+
+
+def test_a_position_is_metres_or_degrees(tmp_path):
+    nowhere = situation.Place(False)
+    there = situation.Place(True, tuple(np.radians([20, 76.5])))
+    assert situation.position("1.5 km, -20", nowhere, "--to") == (1500, -20)
+    assert situation.position("20E,76.5N", there, "--to") == pytest.approx((0, 0), abs=1e-6)
+    assert situation.position("76.51N,20E", there, "--to") == pytest.approx((1116, 0), abs=1)
+    assert situation.goal("1,2:3,4", nowhere) == ((1, 2), (3, 4))
+    for text, place in (("20E,76N", nowhere), ("20E,21E", there), ("1", there), ("1,x", there), ("20E,97N", there)):
+        with pytest.raises(RunError) as caught:
+            situation.position(text, place, "--to")
+        assert caught.value.status == USAGE
+
+
+# ---- distances
+
+
+def test_distances_of_polygons():
+    """Against the least distance of points sampled on both outlines, and squares with a known gap."""
+    rng = np.random.default_rng(1)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    assert apart.of(square, square + [3, 0]) == pytest.approx(2)
+    assert apart.of(square, square + [2, 2]) == pytest.approx(np.sqrt(2))
+    assert apart.of(square, square * 0.2 + 0.4) == 0 == apart.of(square, square + 0.5)
+    cross = np.array([[-1, 0.4], [2, 0.4], [2, 0.6], [-1, 0.6]])  # no corner of either in the other
+    assert apart.of(square, cross) == 0
+    for _ in range(20):
+        p, q = (rng.normal(size=2) * 2 + np.c_[np.cos(a := np.sort(rng.uniform(0, 6.28, 6))), np.sin(a)]
+                for _ in range(2))
+        found = apart.of(p, q)
+        if found > 0:
+            a, b = (np.concatenate([e + (f - e) * np.linspace(0, 1, 200)[:, None] for e, f in zip(
+                s, np.roll(s, -1, 0))]) for s in (p, q))
+            brute = np.hypot(*(a[:, None] - b).transpose(2, 0, 1)).min()
+            assert found <= brute + 1e-12 and brute - found < 0.02
+
+
+def test_contact_with_an_area_is_that_of_the_hull():
+    """A hull that is longer than wide passes a shoal or touches it by its yaw alone."""
+    hull = np.array([[-2, -0.5], [2, -0.5], [2, 0.5], [-2, 0.5]])
+    shoal = [np.array([[-1, 1], [1, 1], [0, 3.0]])]
+    way = np.column_stack([np.linspace(-5, 5, 101), np.zeros(101), np.zeros(101)])
+    assert apart.least(way, hull, shoal, 1.0) == pytest.approx(0.5)
+    assert apart.least(way + [0, 0, np.pi / 2], hull, shoal, 1.0) == 0
+    assert apart.least(way, hull, []) == np.inf
+
+
+# ---- members of a map
+
+
+def test_members_are_the_map_within_its_errors(tmp_path):
+    """Red: floes overlap; the spread is another than said; a member depends on the others."""
+    s = read_situation(tmp_path, changed(BASIN, ice__concentration=0.3))
+    errors = members.Errors(0.05, 0.2, 0.004)
+    some = members.drawn(30, s, errors, tmp_path / "m")
+    base = members.Floes.read(s.field)
+    shifts, factors = [], []
+    for m in some:
+        floes = members.Floes.read(m.keys["ice.field"])
+        assert len(floes.area) == len(base.area) - m.left_out
+        if not m.left_out:
+            shifts.append(floes.pose[:, :2] - base.pose[:, :2])
+            factors.append(floes.thickness / base.thickness)
+    assert len(shifts) > 5
+    common = np.array([d.mean(axis=0) for d in shifts])
+    assert np.abs(common[:, 1]).max() < 0.02                     # walls at the sides: the map keeps its place there
+    assert common[:, 0].std() == pytest.approx(0.05 * np.sqrt(0.5), rel=0.5)
+    assert np.log(np.concatenate(factors)).std() == pytest.approx(0.2, rel=0.25)
+    drift = np.array([m.drift for m in some])
+    assert drift.std() == pytest.approx(0.004, rel=0.3) and abs(drift.mean()) < 0.002
+    outlines = members.Floes.read(some[0].keys["ice.field"]).outlines()
+    reach = [apart.radius(o, o.mean(axis=0)) for o in outlines]
+    for i, p in enumerate(outlines):
+        for j in range(i):
+            if np.hypot(*(p.mean(axis=0) - outlines[j].mean(axis=0))) < reach[i] + reach[j]:
+                assert apart.of(p, outlines[j]) > 0
+    again = members.drawn(3, s, errors, tmp_path / "again")[2]
+    with h5py.File(again.keys["ice.field"]) as a, h5py.File(some[2].keys["ice.field"]) as b:
+        assert np.array_equal(a["floes/pose"], b["floes/pose"])
+    for m in some[:2]:  # the program takes them
+        sets = [w for k, v in m.keys.items() for w in ("--set", f"{k}={v}")]
+        assert call("check", s.case, *sets).returncode == DONE
+
+
+def test_a_map_without_errors_is_one_member(tmp_path):
+    s = read_situation(tmp_path, BASIN)
+    (one,) = members.drawn(10, s, members.Errors(0, 0, 0), tmp_path)
+    assert one.keys == {"ice.field": str(s.field)} and one.drift == (0, 0)
+
+
+def test_the_floes_are_those_of_the_run(tmp_path):
+    """By hand, fixed and made: where the run has them."""
+    case = changed(BASIN, ice__concentration=0.3, ice__x_min=5)
+    case["floes"] = [{"shape": "square", "length": 0.5, "x": 3.7, "y": 1}, {"shape": "disc", "length": 0.6, "x": 3.7,
+                                                                            "y": -1, "fixed": True}]
+    s = read_situation(tmp_path, case)
+    done = run(tmp_path / "run", changed(case, run__duration=0.1, output__frame_interval=0.1))
+    with Run(done.dir) as r:
+        theirs = r.polygons(0)
+        assert len(s.ice.outlines) == r.n_floes - 1 == len(s.moving)
+        for mine, i in zip(s.ice.outlines, s.moving):
+            assert np.allclose(mine, theirs[i], atol=1e-12)
+    (fixed,) = s.no_go
+    assert fixed.mean(axis=0) == pytest.approx((3.7, -1))
+
+
+# ---- routes as cases
+
+
+def circle(radius, length, turns, speed):
+    """A straight way, and circles: what a planner's route has."""
+    angle = np.linspace(0, 2 * np.pi * turns, int(400 * turns))[1:]
+    straight = np.linspace(0, length, 200)
+    x = np.append(straight, length + radius * np.sin(angle))
+    y = np.append(0 * straight, radius * (1 - np.cos(angle)))
+    way = np.append(0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
+    return SimpleNamespace(kind="planned", x=x, y=y, heading=np.append(0 * straight, angle), time=way / speed,
+                           length=way[-1], duration=way[-1] / speed, force=0.0,
+                           legs=np.array([(speed,)], [("speed", float)]))
+
+
+@pytest.mark.parametrize("mass", ["20 kt", "0.31 Mt"])
+def test_a_towed_body_keeps_its_circle(tmp_path, mass):
+    """A turn of 800 m on 600 m of line: R_end² = R² - 2 R L sin(delta) + L², of a light body R_end² = R² + L². Red: the
+    end goes where the tractrix has it (150 m for the heavy body); the body's own circle is given to the end."""
+    case = {"run": {"dt": 4, "duration": 100}, "domain": {"frame": "geographic", "length": 9000, "width": 9000,
+                                                          "ends": "open", "sides": "open"},
+            "ice": {"concentration": 0, "size": 30, "thickness": 1},
+            "body": {"length": 80, "draft": 60, "x": 0, "y": 0, "mass": mass},
+            "tow": {"mode": "line", "speed": 0.5, "line_length": "560 m", "line_stiffness": "40 MN", "ramp": 300,
+                    "line_damping": "500 kN s/m"}}
+    s, radius = read_situation(tmp_path, case), 800
+    c = tows.candidate("c", "c", circle(radius, 1000, 1.5, 0.5), 0.5, s)
+    sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
+    assert call("run", s.case, "-o", tmp_path / "run", "--quiet", *sets).returncode == DONE
+    with Run(tmp_path / "run") as r:
+        late = (r["time"] > 8000) & (r["time"] < 14000)
+        body = np.hypot(r["body_x"][late] - 1000, r["body_y"][late] - radius)
+        end = np.hypot(r["carriage_x"][late] - 1000, r["carriage_y"][late] - radius)
+        off = apart.to_edges(np.column_stack([r["body_x"], r["body_y"]])[r["time"] < 14000],
+                             np.vstack([c.track, c.track[::-1]]))
+    assert body.mean() == pytest.approx(radius, rel=5e-3) and off.max() < 0.02 * radius
+    sine = np.sin(np.arctan(s.mass / (body.mean() * s.hull.drag)))
+    wanted = np.sqrt(body.mean() ** 2 - 2 * body.mean() * s.line * sine + s.line ** 2)
+    assert end.mean() == pytest.approx(wanted, rel=5e-3)
+    if mass == "20 kt":
+        assert end.mean() == pytest.approx(np.sqrt(radius ** 2 + s.line ** 2), rel=0.02)
+
+
+def test_a_programme_of_legs_goes_their_way():
+    legs = np.array([(0, 100, 0.5), (100, 80, 0.2), (180, 60, 0.4)], [(n, float) for n in ("way", "length", "speed")])
+    t, v = np.array(tows.programme(legs, 30)).T
+    assert np.trapz(v, t) == pytest.approx(240) and np.all(np.diff(t) > 0)
+    assert list(np.unique(v)) == [0, 0.2, 0.4, 0.5]
+
+
+def test_a_polyline_keeps_within_its_distance():
+    a = np.linspace(0, 3, 500)
+    xy = np.column_stack([a, np.sin(2 * a)])
+    few = tows.simplified(xy, 0.01)
+    line = np.vstack([few, few[::-1]])
+    assert apart.to_edges(xy, line).max() <= 0.01 and 8 < len(few) < 40
+    assert np.array_equal(few[[0, -1]], xy[[0, -1]])
+
+
+def test_the_goal_is_reached_where_the_body_is_nearest():
+    xy = np.column_stack([np.linspace(0, 10, 101), np.full(101, 0.3)])
+    assert tows.arrival(xy, (8, 0), 1) == 80
+    assert tows.arrival(xy, ((8, -1), (8, 1)), 1) == 80
+    assert tows.arrival(xy, (8, 3), 1) is None
+    back = np.vstack([xy, xy[::-1]])
+    assert tows.arrival(back, (8, 0), 1) == 80  # not on the way back
+
+
+def test_work_in_open_water_is_known(tmp_path):
+    """Drag times the way and the kinetic energy. Red: force and way of different directions or times."""
+    case = changed(BASIN, ice__concentration=0, domain__length=40, tow__speed=0.4)
+    write_case(tmp_path, case)
+    done = script("route", tmp_path / "case.yml", "--to", "22.5,0", "-o", tmp_path / "out", "--members", "1")
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    (tow,) = next(r for r in found["routes"] if r["kind"] == "straight")["members"]
+    s = read_situation(tmp_path, case)
+    assert tow["work"] == pytest.approx(s.hull.drag * 0.4 ** 2 * 20 + s.mass * 0.4 ** 2 / 2, rel=0.02)
+    assert tow["time"] == pytest.approx(20 / 0.4 + s.ramp / 2, abs=0.2) and tow["arrived"]
+    assert tow["peak"] == pytest.approx(s.hull.drag * 0.4 ** 2, rel=0.02)
+    assert found["verdict"]["code"] in ("one_member", "no_route") and found["verdict"]["recommended"] is None
+
+
+# ---- an honest choice
+
+
+def made_up(name, values, straight=False, **more):
+    c = SimpleNamespace(name=name, straight=straight, route=SimpleNamespace(faults=()))
+    rows = [{"arrived": True, "work": v, "no_go_contact": False, "limit_exceeded": False, "parted": False,
+             "slack": False} | more for v in values]
+    return c, rows
+
+
+def judged(*some):
+    return verdict.of([c for c, _ in some], {c.name: rows for c, rows in some}, "work")
+
+
+def test_one_half_chooses_and_the_other_judges():
+    straight = made_up("straight", [10] * 4 + [10.0, 11, 12, 13], True)
+    good_first = made_up("a", [5] * 4 + [12.0, 12, 12, 15])
+    good_last = made_up("b", [9] * 4 + [1.0, 1, 1, 2])
+    v = judged(straight, good_first, good_last)
+    assert v["chosen"] == "a" and v["code"] == "not_shown" and v["recommended"] is None
+    assert v["compared"]["a"]["difference"] == pytest.approx(1.25) and v["judged"] == [5, 6, 7, 8]
+    v = judged(straight, made_up("b", [4] * 4 + [1.0, 1, 1, 2]), good_first)
+    assert v["chosen"] == v["recommended"] == "b" and v["code"] == "better"
+    assert v["compared"]["b"]["difference_95"][1] < 0
+    assert judged(straight, good_first)["planner_best"]["lost"] == 3  # 12 > 10, 12 > 11, 15 > 13
+
+
+def test_the_best_of_many_that_are_alike_is_seldom_recommended():
+    """Red: the members that choose judge, too: then it is a third."""
+    rng, n, found, naive = np.random.default_rng(8), 400, 0, 0
+    for _ in range(n):
+        some = [made_up(f"r{k}", rng.normal(10, 1, 12), k == 0) for k in range(8)]
+        found += judged(*some)["recommended"] is not None
+        straight = some[0][1]
+        naive += any(verdict.shown(verdict.compared(rows, straight, range(12), "work")) for _, rows in some[1:])
+    assert found / n < 0.025 + 3 * np.sqrt(0.025 / n) and naive / n > 0.08
+
+
+def test_failures_come_before_the_objective():
+    straight = made_up("straight", [10.0, 11, 12, 13] * 4, True)
+    lost = made_up("lost", [1.0, 1, 1, 2] * 4, arrived=False)
+    v = judged(straight, lost)
+    assert v["order"][0] == "straight" and v["code"] == "not_shown"
+    limited = made_up("straight", [10.0, 11, 12, 13] * 4, True, limit_exceeded=True)
+    v = judged(limited, made_up("a", [20.0, 21, 22, 23] * 4))
+    assert v["recommended"] == "a" and v["compared"]["a"]["fails_less"] == 8
+    few = judged(made_up("straight", [10.0, 11] * 2, True, limit_exceeded=True), made_up("a", [9.0, 9] * 2))
+    assert few["recommended"] is None  # two of two may be chance
+
+
+# ---- the command
+
+
+def test_what_a_call_leaves(routed):
+    found, out = routed.found, routed.out
+    assert found["status"] in ("ok", "fewer_routes") and found["verdict"]["members"] == 4
+    assert found["routes"][0]["name"] == "straight" and len(found["routes"]) >= 2
+    for r in found["routes"]:
+        assert len(r["members"]) == 4 and all(t["arrived"] for t in r["members"])
+        assert r["simulated"]["length"] == pytest.approx(r["predicted"]["length"], rel=0.05)
+    map_ = json.loads((out / "routes.geojson").read_text())
+    assert map_["crs"]["properties"]["name"] == situation.LOCAL
+    kinds = [(f["properties"]["route"], f["properties"]["track"]) for f in map_["features"]]
+    assert kinds[:2] == [("straight", "berg"), ("straight", "swath")]
+    line = map_["features"][0]["geometry"]["coordinates"]
+    assert line[0] == pytest.approx([2.5, 0]) and line[-1] == pytest.approx([8.5, 0.3])
+    assert not (out / "routes.gpx").exists() and "<iframe" in (out / "route.html").read_text()
+    assert "No route shown better" in routed.said or "Take route" in routed.said
+
+
+def test_every_route_is_towed_through_the_same_ice(routed):
+    fields = {}
+    for path in (routed.out / "route").glob("*/f00*/case.resolved.yml"):
+        text = path.read_text()
+        fields.setdefault(path.parent.name, set()).add((re.search(r"field: (.*?)(?:  #|\n)", text)[1],
+                                                        *re.findall(r"current_[xy]: (\S+)", text)))
+    assert len(fields) == 4 and all(len(f) == 1 for f in fields.values())
+    assert len({tuple(f)[0][1:] for f in fields.values()}) == 4  # drifts of their own
+
+
+def test_a_route_is_a_case(routed, tmp_path):
+    """The file of a route leads to the very tow, in the ice of the map."""
+    done = script("route", routed.folder / "case.yml", *QUICK[:4], "--members", "1", "-o", tmp_path / "out")
+    assert done.returncode == DONE, done.stderr
+    for r in json.loads((tmp_path / "out/route.json").read_text())["routes"]:
+        assert call("run", tmp_path / "out" / r["case"], "-o", tmp_path / r["name"], "--quiet").returncode == DONE
+        assert json.loads((tmp_path / r["name"] / "summary.json").read_text())["state_hash"] == r["members"][0]["hash"]
+
+
+def without_clocks(found):
+    return json.loads(re.sub(r'"(plan_s|tows_s|estimate_s|wall_s)": [\d.e+-]+', r'"\1": 0', json.dumps(found)))
+
+
+def test_what_is_killed_goes_on(routed, tmp_path):
+    """Red: nothing is written before the end; the tows are made again; the verdict is another one."""
+    write_case(tmp_path, BASIN)
+    out = tmp_path / "out"
+    words = [sys.executable, "-m", "bergtow", "route", str(tmp_path / "case.yml"), *QUICK, "-o", str(out)]
+    env = environment(BERGTOW=BERGTOW, PYTHONPATH=ROOT / "postproc")
+    process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and len(list(out.glob("route/*/f0*/finished"))) < 3:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    process.communicate()
+    assert process.returncode == SIGNAL
+    for name in ("route.json", "routes.geojson", "straight.yml", "route.png"):
+        assert (out / name).exists(), name
+    kept = {p: p.stat().st_mtime_ns for p in out.glob("route/*/f0*/finished")}
+    assert 3 <= len(kept) < 4 * len(routed.found["routes"])
+    assert json.loads((out / "route.json").read_text())["verdict"] is None
+    again = script("route", tmp_path / "case.yml", *QUICK, "-o", out)
+    assert again.returncode == DONE, again.stderr
+    assert all(p.stat().st_mtime_ns == t for p, t in kept.items())
+    assert without_clocks(json.loads((out / "route.json").read_text())) == without_clocks(routed.found)
+
+
+def test_a_place_gives_degrees_and_a_gpx(tmp_path):
+    """Red: latitude first; the points of the body in place of the vessel's."""
+    case = {"run": {"dt": 5, "duration": 100}, "domain": {"frame": "geographic", "length": 4000, "width": 1500,
+                                                          "ends": "open", "sides": "open"},
+            "ice": {"concentration": 0.1, "size": 60, "thickness": 1, "origin_lon": 20, "origin_lat": 76.5},
+            "body": {"length": 80, "draft": 60, "x": -1500, "y": 0},
+            "tow": {"mode": "line", "speed": 0.5, "line_length": 300, "line_stiffness": "40 MN"}}
+    place = situation.Place(True, tuple(np.radians([20, 76.5])))
+    (lon, lat), = place.degrees([(500, 100)])
+    done = script("route", write_case(tmp_path, case), "--to", f"{lon:.8f}E,{lat:.8f}N", "--plan-only", "--routes", "1",
+                  "-o", tmp_path / "out")
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert found["goal"] == pytest.approx([500, 100], abs=0.01) and found["verdict"] is None
+    points = [(float(p.get("lon")), float(p.get("lat"))) for p in ElementTree.parse(
+        tmp_path / "out/routes.gpx").getroot().find("{*}rte").findall("{*}rtept")]
+    end = place.metres(points[-1:])[0]
+    assert np.hypot(*(end - (500, 100))) == pytest.approx(340, rel=0.01)  # a line ahead of the goal
+    map_ = json.loads((tmp_path / "out/routes.geojson").read_text())
+    assert "crs" not in map_ and {f["properties"]["track"] for f in map_["features"]} == {"berg", "tug", "swath"}
+    assert map_["features"][0]["geometry"]["coordinates"][-1] == pytest.approx([lon, lat], abs=1e-6)
+    assert not list((tmp_path / "out/route").glob("*/f001"))
+
+
+def test_a_new_look_leaves_the_way_so_far(tmp_path):
+    """The tow up to a look is that of the looks before, to the bit. Red: the way that is decided moves."""
+    write_case(tmp_path, BASIN)
+    done = script("route", tmp_path / "case.yml", "--to", "8.5,0.3", "--routes", "1", "--members", "1", "--replan",
+                  "12 s", "-o", tmp_path / "out")
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert found["horizon"]["perfect"] and "upper bound" in done.stdout and len(found["rounds"]) >= 3
+    assert (tmp_path / "out/round-1.json").exists()
+    series = []
+    for name in ("look-1", "look-2", "tow-horizon"):
+        with Run(tmp_path / "out/route" / name / "f001") as r:
+            series.append(np.column_stack([r["body_x"], r["body_y"], r["ice_resistance"], r["kinetic_energy"]]))
+    for early, late in zip(series, series[1:]):
+        assert np.array_equal(early, late[:len(early)])
+    assert all(t["arrived"] for t in found["horizon"]["tows"].values())
+
+
+def test_the_function_is_the_command(routed, tmp_path):
+    found = bergtow.route(routed.folder / "case.yml", tmp_path / "out", to=(8.5, 0.3), from_=(2.5, 0), routes=2,
+                          plan_only=True, speeds=[0.13])
+    for mine, theirs in zip(found["routes"], routed.found["routes"]):
+        assert mine["waypoints"] == theirs["waypoints"] and mine["predicted"] == theirs["predicted"]
+    line = bergtow.route(routed.folder / "case.yml", tmp_path / "line", to=((8.5, -0.5), (8.5, 0.5)), plan_only=True)
+    assert line["goal"] == [[8.5, -0.5], [8.5, 0.5]] and line["routes"][0]["predicted"]["length"] <= 6.0001
+
+
+# ---- wrong use
+
+
+LAND = {"type": "Polygon", "coordinates": [[[7, -1], [9.5, -1], [9.5, 1], [7, 1], [7, -1]]]}
+
+
+def local(geometry):
+    return {"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": situation.LOCAL}},
+            "features": [{"type": "Feature", "properties": {}, "geometry": geometry}]}
+
+
+@pytest.mark.parametrize("changes, words, code, said", [
+    ({}, ["--to", "8.5,0", "--no-go", "land.geojson"], CASE, "--to: the goal lies in an area to keep out of"),
+    ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* area to keep out of"),
+    ({}, ["--to", "20E,76N"], USAGE, "in degrees, and the map of this case has no place; set ice.origin_lon"),
+    ({}, ["--to", "8.5,0", "--no-go", "degrees.geojson"], CASE, "the map of this case has no place"),
+    ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
+    ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "no way leads from the start to the goal"),
+    ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
+    ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),
+    ({}, ["--to", "8.5,0", "--map", "map.shp"], USAGE, "bergtow outlines"),
+    ({}, ["--to", "8.5,0", "--speeds", "0"], USAGE, "is not above 0"),
+    ({"tow": {"mode": "none", "speed": 0}}, ["--to", "8.5,0"], CASE, "nothing is towed"),
+    ({"domain__ends": "moving"}, ["--to", "8.5,0"], CASE, "domain.ends"),
+    ({}, ["--to", "8.5,0", "--calibrate", "2"], USAGE, "too few swaths"),
+])
+def test_wrong_use_is_said(tmp_path, changes, words, code, said):
+    write_case(tmp_path, changed(BASIN, **changes))
+    near = np.array(LAND["coordinates"]) - [0.5, 0]
+    barrier = [[[5, -9], [5.5, -9], [5.5, 9], [5, 9], [5, -9]]]
+    files = {"land": local(LAND), "degrees": LAND, "near": local(LAND | {"coordinates": near.tolist()}),
+             "barrier": local(LAND | {"coordinates": barrier})}
+    for name, what in files.items():
+        (tmp_path / f"{name}.geojson").write_text(json.dumps(what))
+    (tmp_path / "text.geojson").write_text("x")
+    (tmp_path / "map.shp").write_text("x")
+    done = script("route", "case.yml", *words, "--members", "1", "-o", "out", cwd=tmp_path)
+    assert done.returncode == code, (done.stdout, done.stderr)
+    assert re.search(said, done.stderr), done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_land_beside_the_line_is_passed(tmp_path):
+    """The straight line crosses a shoal: the route goes round it, in the tow, too."""
+    write_case(tmp_path, changed(BASIN, ice__concentration=0.05))
+    shoal = {"type": "Polygon", "coordinates": [[[5, -0.7], [6, -0.7], [6, 0.4], [5, 0.4], [5, -0.7]]]}
+    (tmp_path / "shoal.geojson").write_text(json.dumps(local(shoal)))
+    done = script("route", "case.yml", "--to", "9.5,0", "--no-go", "shoal.geojson", "--members", "1", "--routes", "1",
+                  "--clearance", "0.1", "-o", "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    straight, route = found["routes"]
+    assert straight["faults"] == ["no_go"] and straight["counts"]["no_go_contact"] == 1
+    assert route["counts"]["no_go_contact"] == 0 and found["verdict"]["code"] == "straight_not_passable"
+    assert found["verdict"]["recommended"] == route["name"]
+
+
+def test_the_fit_says_how_well_it_ranks(tmp_path):
+    write_case(tmp_path, BASIN)
+    done = script("route", "case.yml", "--to", "8.5,0", "--calibrate", "6", "--members", "1", "--routes", "1", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    told = json.loads((tmp_path / "out/route.json").read_text())["calibration"]
+    assert told["swaths"] == 6 and set(told["weights"]) == {"water", "plough", "compaction", "large", "rafting"}
+    assert min(told["weights"].values()) >= 0 and told["poor"] == (not (told["rank_correlation"] or -1) >= 0.5)
+    assert ("ranks this ice poorly" in done.stdout) == told["poor"]
