@@ -210,7 +210,8 @@ class Scene:
         self.rafted = False  #: does the frame that is shown have floes over each other?
         self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
         self._rafts = run.value("ice.rafting.kappa", 0) > 0
-        self._floes.set_rasterized(run.n_floes > style.MANY / 6)
+        for collection in (self._floes, self._rafted):
+            collection.set_rasterized(run.n_floes > style.MANY / 6)
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
         self._solid.set_facecolors([style.WALL if b.wall else style.FIXED for b in run.bodies if not b.towed]
                                    * len(self._images))
