@@ -119,15 +119,15 @@ domain.ends_closing domain.sides_closing domain.ahead ice.concentration ice.x_mi
 ice.extent.x_min ice.extent.x_max ice.extent.y_min ice.extent.y_max
 ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max ice.size_exponent
 ice.thickness ice.thickness_law ice.crushing.pressure ice.splitting.toughness ice.splitting.least_size ice.start
-body.shape body.length body.width body.vertices body.x body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
-tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
-tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y
-tow.branch2.length tow.branch2.stiffness tow.branch2.damping tow.branch2.breaking_load tow.vessel.mass
-tow.vessel.added_mass tow.vessel.bollard_pull tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag
-tow.vessel.lookahead lead.mode lead.width lead.length lead.floe_size water.current_x water.current_y water.tide.major
-water.tide.minor water.tide.period water.latitude water.tilt water.slope_x water.slope_y air.wind_x air.wind_y
-solver.reference_speed impact.duration impact.least_speed output.frame_interval output.window_start estimate.kappa
-estimate.kappa_low estimate.kappa_high
+body.shape body.length body.width body.vertices body.x body.y body.vx body.vy body.yaw_rate body.draft body.sail
+body.mass tow.mode tow.speed tow.direction tow.ramp tow.programme tow.waypoints tow.turn_radius tow.line_length
+tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type tow.line.diameter tow.line.branches
+tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness
+tow.branch2.damping tow.branch2.breaking_load tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull
+tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag tow.vessel.lookahead lead.mode lead.width
+lead.length lead.floe_size water.current_x water.current_y water.tide.major water.tide.minor water.tide.period
+water.latitude water.tilt water.slope_x water.slope_y air.wind_x air.wind_y solver.reference_speed impact.duration
+impact.least_speed output.frame_interval output.window_start estimate.kappa estimate.kappa_low estimate.kappa_high
 """.split())
 
 

@@ -15,7 +15,8 @@ extern "C" {
 /// An added key: always a real number.
 typedef struct bt_law_key {
     const char *name;          ///< after the name of the law or section: the key is NAME.name
-    /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m"; "" = a plain number
+    /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m",
+    /// "Pa m^0.5"; "" = a plain number
     const char *unit;
     /// "0 N", "[0, 1e9]": the law should do nothing by its presets. The range is least and most of a number that is
     /// written without a unit; such a number is in `unit`, but in degrees (a second) for rad (rad/s)

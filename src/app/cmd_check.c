@@ -191,8 +191,8 @@ static void print_laws(const bt_case *c, const bt_check_ice *n)
     }
     if (n->count < 1 || !(c->ice.splitting.toughness > 0)) return;
     const bt_check_split s = bt_check_split_of(c, n);
-    printf("splitting            a mean floe, as a square, splits under %.4g N at three points, and %.4g N on each side of "
-           "a wedge; pieces at least %.3g m wide (toughness and strength are not calibrated)\n",
+    printf("splitting            a mean floe, as a square, splits under %.4g N at three points, and %.4g N on each "
+           "side of a wedge; pieces at least %.3g m wide (toughness and strength are not calibrated)\n",
            s.three_point, s.opening, c->ice.splitting.least_size);
 }
 

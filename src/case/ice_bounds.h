@@ -52,7 +52,8 @@ void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings);
 /// rest: a contact may close by the tolerance of the solver.
 void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings);
 
-/// Warn of a mean thickness that looks like one in centimetres, and of one at which floes do not split. size, thickness: of the mean floe, m.
+/// Warn of a mean thickness that looks like one in centimetres, and of one at which floes do not split. size,
+/// thickness: of the mean floe, m.
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings);
 
 #endif

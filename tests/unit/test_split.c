@@ -449,7 +449,7 @@ static void test_bound(void **state)
         for (int k = 0; k < n; k++) {
             load[k] = random_load(&r, &f, 1e5, k);
             if (trial % 2) load[k].fx = 1e5 * bt_rng_normal(&r), load[k].fy = 1e5 * bt_rng_normal(&r);
-            if (k % 2) load[k].x = f.v[2 * k % 8], load[k].y = f.v[2 * k % 8 + 1], load[k].length = 0; // vertex k or less
+            if (k % 2) load[k].x = f.v[2 * k % 8], load[k].y = f.v[2 * k % 8 + 1], load[k].length = 0; // a corner
             on_edge[k] = bt_edge_load_of(&s, &load[k], 1e-6);
         }
         const bt_load_case w = bt_load_case_of(on_edge, n, -1);
