@@ -83,7 +83,7 @@ static void guards_fire_at_their_limits(void **state)
     bt_guard g = {0};
     bt_sample s = sound_sample(w);
     const double mass = w->bodies.mass[0] + w->bodies.mass[1], speed = 0.2;
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     expect(&g, w, &s, NULL);
 
     s.overlap = 0.399;
@@ -115,7 +115,7 @@ static void guards_fire_at_their_limits(void **state)
     c.guard.overlap = c.guard.energy = 0;
     c.guard.unconverged = 0;
     c.guard.escape = false;
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     s.overlap = s.kinetic_energy = 1e30;
     s.unconverged = 1;
     w->bodies.pose[bt_world_index(w, 1)].y = 4.01;
@@ -131,7 +131,7 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     bt_world *w = two_floes();
     bt_guard g = {0};
     const bt_sample s = sound_sample(w);
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     double *y = &w->bodies.pose[bt_world_index(w, 1)].y;
     for (int k = 0; k < 3; k++, w->step++) {
         expect(&g, w, &s, NULL);
@@ -159,7 +159,7 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     *y = 3.05;
     expect(&g, w, &s, NULL);
     c.domain.sides_closing = 0.2;
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     expect(&g, w, &s, "floe 1 is beyond a wall");
     *y = 2.95;
     expect(&g, w, &s, NULL);
@@ -170,14 +170,14 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     c.domain.sides_closing = 0;
     *y = 4.01;
     w->towed = 1;
-    bt_guard_begin(&g, &c, w, 1, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 1, .n_free = 1, .mean_size = 0.8});
     expect_of(&g, w, &s, true, "the towed body is beyond a wall");
     w->towed = -1;
     w->bodies.motion[bt_world_index(w, 1)] = BT_STATIC;
     expect_of(&g, w, &s, true, NULL);
     w->bodies.motion[bt_world_index(w, 1)] = BT_DYNAMIC;
     c.domain.sides = BT_BOUND_OPEN;
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     expect(&g, w, &s, NULL);
 
     // Out there it may go round the ends of the walls that there are; within their breadth it has come through.
@@ -189,7 +189,7 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     *x = -5.5; // behind it
     expect_of(&g, w, &s, true, NULL);
     c.domain.sides = BT_BOUND_PERIODIC; // no way round
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     expect_of(&g, w, &s, true, "floe 1 is beyond a wall");
     bt_world_free(w);
 }
@@ -201,7 +201,7 @@ static void numbers_that_are_none_are_found_in_bodies(void **state)
     bt_world *w = two_floes();
     bt_guard g = {0};
     const bt_sample s = sound_sample(w);
-    bt_guard_begin(&g, &c, w, 2, 0.8);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
     const bt_idx i = bt_world_index(w, 1);
     double *const number[] = {&w->bodies.pose[i].x, &w->bodies.pose[i].y, &w->bodies.pose[i].yaw,
                               &w->bodies.vel[i].x,  &w->bodies.vel[i].y,  &w->bodies.vel[i].w};
@@ -247,7 +247,7 @@ static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **
     bt_guard g = {0};
     bt_sample s;
     bt_observe(w, 0.13, &s);
-    bt_guard_begin(&g, &c, w, r.n_floes, r.mean_size);
+    bt_guard_begin(&g, &c, w, &r);
     expect(&g, w, &s, NULL);
     expect_of(&g, w, &s, true, NULL);
     const struct { double *number; const char *name;
@@ -303,14 +303,14 @@ static void numbers_that_are_none_are_found_in_samples(void **state)
         const double before = *x, before_without = *y, none[] = {NAN, INFINITY, -INFINITY, 1e100, -2e100};
         char part[80];
         snprintf(part, sizeof part, "step 50: %s (", f->name);
-        bt_guard_begin(&g, &c, w, r.n_floes, r.mean_size);
+        bt_guard_begin(&g, &c, w, &r);
         g.overlap = g.energy = 0, g.unconverged = 0;
         for (int j = 0; j < 5; j++) {
             *x = none[j];
             expect(&g, w, &s, part);
         }
         *x = before;
-        bt_guard_begin(&g, &walls, bare, 2, 0.8);
+        bt_guard_begin(&g, &walls, bare, &(bt_roster){.n_floes = 2, .n_free = 2, .mean_size = 0.8});
         g.overlap = 0, g.unconverged = 0;
         *y = f->applies == BT_APPLIES_ALWAYS ? NAN : 0;
         expect(&g, bare, &without,
@@ -379,7 +379,7 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
             fail_msg("scene %d: %s", scene, err.text[0]);
         c.guard.energy = 1;
         bt_guard g = {0};
-        bt_guard_begin(&g, &c, w, 1, size);
+        bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 1, .n_free = 1, .mean_size = size});
         for (int k = 0; k < 300; k++) {
             bt_world_step(w);
             if (!(w->stats.kinetic_energy <= g.energy * (1 + 1e-9)))
@@ -430,7 +430,7 @@ static void no_floe_is_drawn_beyond_the_scale(void **state)
     if (bt_case_finish(&c, &err) != BT_OK || bt_setup_world(&c, &f, &w, &r, &err) != BT_OK) fail_msg("%s", err.text[0]);
     c.guard.energy = 1;
     bt_guard g = {0};
-    bt_guard_begin(&g, &c, w, 1, 1);
+    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 1, .n_free = 1, .mean_size = 1});
     for (int k = 0; k < 200; k++) {
         bt_world_step(w);
         assert_true(w->stats.kinetic_energy <= g.energy * (1 + 1e-9));
