@@ -128,7 +128,7 @@ static inline bt_status record_frame(bt_record *r, int k, bt_errors *err)
                                  .fx = 1 + i,
                                  .fy = -k - 0.5};
     const bt_frame_line line = {{{{1, 2}, {3 + k, 4}}, {{5, 6}, {7, 8 + k}}}, {100 + k, 200}};
-    return bt_record_frame(r, 0.5 * k, rows, &line, err);
+    return bt_record_frame(r, 0.5 * k, rows, &line, NULL, 0, err);
 }
 
 static bool print_summary;

@@ -113,20 +113,20 @@ static void net_forces_of_two(void **state)
         d.x = -10.02 * k, d.vx = k ? 1 : -1;
         bt_world_add(w, &d);
     }
-    bt_observe_net_force(&bt_comm_alone, w, 2, force);
+    bt_observe_net_force(&bt_comm_alone, w, &(bt_roster){.n_free = 2}, force);
     assert_true(force[0][0] == 0 && force[1][0] == 0);
     bt_world_step(w);
     const bt_bodies *b = &w->bodies;
     const int i = b->gid[0] == 0 ? 0 : 1;
-    bt_observe_net_force(&bt_comm_alone, w, 2, force);
+    bt_observe_net_force(&bt_comm_alone, w, &(bt_roster){.n_free = 2}, force);
     assert_true(force[i][0] > 1e4 && fabs(force[0][0] + force[1][0]) < 1e-9 * force[i][0]);
     assert_true(fabs(force[i][1]) < 1e-9 * force[i][0]);
     assert_float_equal(force[i][0], b->mass[i] * (b->vel[i].x - b->vel_start[i].x) / 0.1, 0.1 * force[i][0]); // drag
-    bt_observe_net_force(&bt_comm_alone, w, 1, by_contacts);
+    bt_observe_net_force(&bt_comm_alone, w, &(bt_roster){.n_free = 1}, by_contacts);
     assert_float_equal(by_contacts[1 - i][0], force[1 - i][0], 1e-9 * force[i][0]);
     bt_errors err = {0};
     assert_int_equal(bt_edit_velocity(w, 0, (const double[3]){7, 8, 9}, &err), BT_OK);
-    bt_observe_net_force(&bt_comm_alone, w, 2, by_contacts);
+    bt_observe_net_force(&bt_comm_alone, w, &(bt_roster){.n_free = 2}, by_contacts);
     assert_float_equal(by_contacts[i][0], force[i][0], 1e-9 * force[i][0]);
     bt_world_free(w);
 }

@@ -246,7 +246,7 @@ static void an_empty_field_can_be_recorded(void **state)
     bt_record *r;
     assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, NULL, &err), BT_OK);
     const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
-    assert_int_equal(bt_record_frame(r, 0, &row, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_frame(r, 0, &row, NULL, NULL, 0, &err), BT_OK);
     const bt_run_totals t = totals(0);
     assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);
     assert_int_equal(err.n, 0);
@@ -281,7 +281,7 @@ static void many_floes_are_packed(void **state)
                                 .towed = -1};
     bt_record *r;
     assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, NULL, &err), BT_OK);
-    assert_int_equal(bt_record_frame(r, 0, rows, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_frame(r, 0, rows, NULL, NULL, 0, &err), BT_OK);
     const bt_run_totals t = totals(0);
     assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);
     const hid_t f = H5Fopen(in_folder("many/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
