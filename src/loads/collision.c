@@ -21,11 +21,12 @@ static double interior_angle(const bt_bodies *b, bt_idx i, int part, uint32_t v)
     return BT_PI - bt_atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
-bt_contact_corner bt_contact_corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2], uint32_t feature)
+bt_contact_corner bt_contact_corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2],
+                                       uint32_t feature)
 {
     if ((feature >> 20) == 0x7ffu)
         return (bt_contact_corner){bt_min(interior_angle(b, u->a, part[0], (feature >> 10) & 0x3ffu),
-                                  interior_angle(b, u->b, part[1], feature & 0x3ffu)), -1};
+                                          interior_angle(b, u->b, part[1], feature & 0x3ffu)), -1};
     const bool reference_b = feature >> 31, of_reference = feature & 1u, of_b = reference_b == of_reference;
     return (bt_contact_corner){interior_angle(b, of_b ? u->b : u->a, part[of_b], (feature & 0xfffffu) >> 1), of_b};
 }

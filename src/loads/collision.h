@@ -23,6 +23,7 @@ typedef struct bt_contact_corner {
 } bt_contact_corner;
 
 /// The corner that makes a contact point of a pair of parts, by its feature as manifold.c numbers them.
-bt_contact_corner bt_contact_corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2], uint32_t feature);
+bt_contact_corner bt_contact_corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2],
+                                       uint32_t feature);
 
 #endif

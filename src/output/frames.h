@@ -35,8 +35,8 @@ void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_
 /// Where ParaView's part of the next frame is, into path, which is returned.
 char *bt_frames_group(const bt_frames *f, char path[64]);
 
-/// Collective. Add a frame, whose group is there: rows of this rank's block. Returns the same status on all ranks; after a failure the file
-/// stays as the last flush left it.
+/// Collective. Add a frame, whose group is there: rows of this rank's block. Returns the same status on all ranks;
+/// after a failure the file stays as the last flush left it.
 bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line);
 void bt_frames_close(bt_frames *f); ///< datasets and memory
 

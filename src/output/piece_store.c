@@ -26,7 +26,7 @@ static const column splits[BT_SPLIT_COLUMNS] = {
     [MODE] = {"/splits/mode", true, 0, "split", "1", "1 = opened at the load, 2 = bent at the far end, 3 = burst"},
     [RATIO] = {"/splits/ratio", false, 0, "split", "1", "stress over strength"},
     [THICKNESS] = {"/splits/thickness", false, 0, "split", "m", "thickness of the floe"},
-    [CRACK] = {"/splits/crack", false, 4, "split end_of_crack", "m", "x, y of the end at the load and of the other end"},
+    [CRACK] = {"/splits/crack", false, 4, "split end_of_crack", "m", "x, y of the end at the load, then of the other"},
 };
 
 /// A column of the pieces in the frames.

@@ -278,8 +278,8 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 /// /frames/velocity and /frames/net_force [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2],
 /// /frames/line_tension [T][k]; and for ParaView in single precision with all vertices as drawn (/xdmf, see
 /// src/output/xdmf.c).
-/// line: the same on all ranks, read where there are branches. pieces [n_pieces]: on rank 0 (bt_record_watch_splitting).
-/// The status is the same on all ranks.
+/// line: the same on all ranks, read where there are branches. pieces [n_pieces]: on rank 0, see
+/// bt_record_watch_splitting. The status is the same on all ranks.
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
                           const bt_piece_row *pieces, int64_t n_pieces, bt_errors *err);
 

@@ -194,7 +194,8 @@ static void warn_of_splits(bt_summary *s, const bt_run_totals *t)
                 (long long)p->no_id, (long long)t->splitting->reserve);
     if (p->unconverged > 0)
         bt_warn(&s->warnings, BT_WARN_SPLIT_UNCONVERGED,
-                "%lld of %lld steps did not converge, and no floe split in them; raise solver.max_sweeps or lower run.dt",
+                "%lld of %lld steps did not converge, and no floe split in them; raise solver.max_sweeps or lower "
+                "run.dt",
                 (long long)p->unconverged, (long long)t->n_steps);
 }
 

@@ -147,7 +147,7 @@ static void print_forces(const bt_summary *s, const bt_case *c)
 static void print_splits(const bt_splitting *p)
 {
     const bt_split_totals *t = &p->total;
-    printf("  splits              %lld: %lld at a load, %lld bent, %lld burst; cracks of %.4g m, fracture work %.4g J\n",
+    printf("  splits              %lld: %lld at a load, %lld bent, %lld burst; cracks of %.4g m, work %.4g J\n",
            (long long)p->n, (long long)t->by_mode[BT_SPLIT_NEAR], (long long)t->by_mode[BT_SPLIT_FAR],
            (long long)t->by_mode[BT_SPLIT_BURST], t->crack_length, t->work);
     printf("    could not split   %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",

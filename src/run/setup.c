@@ -334,7 +334,8 @@ bt_track bt_setup_track(const bt_case *c, double size, double thickness, double 
     bt_world *w = one_floe(&coarse, size, thickness, concentration);
     w->environment = bt_environment_create(&coarse);
     bt_errors unfound = {0};
-    begin_drift(&coarse, w, &(bt_roster){.n_floes = 1, .n_free = 1}, &unfound); // where it is not found from rest, as undisturbed ice goes on
+    // where it is not found from rest, as undisturbed ice goes on
+    begin_drift(&coarse, w, &(bt_roster){.n_floes = 1, .n_free = 1}, &unfound);
     bt_errors_free(&unfound);
     bool held[2];
     held_ice(c, concentration, held);

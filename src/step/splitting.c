@@ -114,8 +114,8 @@ static centre centre_of(const bt_world *w, const bt_contact *u)
 
 #define WEDGE (BT_PI / 3) // half angle from which on the thrust of a wedge closes the crack that it would open
 
-/// Opening of the floe by a sharp vertex of another one that goes into it: the pair of forces along the edge, per normal
-/// force; 0 = none. A rigid vertex does not go in.
+/// A sharp vertex of another body that goes into the floe opens it by a pair of forces along the edge: each of them per
+/// normal force, 0 = none. A rigid vertex does not go in.
 static double wedge_of(const bt_world *w, const bt_contact *u, const bt_contact_corner *corner, bool of_b)
 {
     if (corner->of != (of_b ? 0 : 1)) return 0; // the vertex is not of the other body
@@ -382,7 +382,8 @@ static void put_piece(bt_world *w, bt_idx i, const bt_split_record *r, int k, co
                  own = bt_shape_moments(n, v).cubic;
     double s, c;
     bt_sincos(b->pose[i].yaw, &s, &c);
-    const double *at = r->at[k], dx = c * at[0] - s * at[1], dy = s * at[0] + c * at[1], share = r->area[k] / b->area[i];
+    const double *at = r->at[k], dx = c * at[0] - s * at[1], dy = s * at[0] + c * at[1],
+                 share = r->area[k] / b->area[i];
     const bt_vel u = b->vel_start[i];
     int32_t lap = b->lap[i], across = 0;
     bt_body_def d = {

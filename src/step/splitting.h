@@ -9,8 +9,8 @@
 //
 // A piece has the velocity field of its parent,
 //     v_i = V + ω k×(c_i − c),   ω_i = ω,
-// so that momentum, angular momentum and kinetic energy are those of the parent to rounding (with added mass, too, where
-// C_I = C_m), and areas and moments of area add up to the parent's.
+// so that momentum, angular momentum and kinetic energy are those of the parent to rounding (with added mass, too,
+// where C_I = C_m), and areas and moments of area add up to the parent's.
 //
 // Ids. An id names one outline for ever: both pieces get new ids, and that of the parent is gone. Those of pieces are
 // kept when the world is set up, after the generated floes and before all other bodies, whose coefficients prevail over
@@ -51,7 +51,7 @@ typedef struct bt_split_record {
 typedef struct bt_split_totals {
     int64_t by_mode[BT_SPLIT_MODES];
     int64_t deferred;           ///< floes that waited for the next step, in all steps
-    int64_t too_small;          ///< floes that would have split into pieces that are too small or too thin, in all steps
+    int64_t too_small;          ///< floes whose pieces would have been too small or too slender, in all steps
     int64_t too_old;            ///< of the last generation
     int64_t no_id;              ///< no ids were left
     int64_t rafted;             ///< they lay over or under others
@@ -102,9 +102,8 @@ int64_t bt_splitting_generation(const bt_splitting *s, bt_gid gid);
 /// The floe that was there from the start, and the way from it to gid (bt_split_scatter).
 bt_gid bt_splitting_ancestor(const bt_splitting *s, bt_gid gid, int64_t *path);
 
-/// Collective. After the solve. Cuts the floes that split, whose pieces are new bodies of the world, with all velocities
-/// as at the start of the step, and returns true: the step is to be solved again. False: nothing splits, or `round` is
-/// BT_SPLIT_ROUNDS.
+/// Collective. After the solve. True: floes were cut, their pieces are new bodies, all velocities are those at the
+/// start of the step, and it is to be solved again. False: nothing splits, or `round` is BT_SPLIT_ROUNDS.
 bool bt_splitting_step(bt_world *w, int round);
 
 /// After bodies have been set up as in the beginning, before they are distributed: pieces in the place of parents, as
