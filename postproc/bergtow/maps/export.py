@@ -292,7 +292,7 @@ def geojson(layer, place):
 
 def write_ogr(layers, place, path, driver):
     """Layers by GDAL, in a file that is not there yet. Names that it has changed, {ours: its own}."""
-    from osgeo import gdal, ogr, osr
+    from osgeo import ogr, osr
     ogr.UseExceptions()
     osr.UseExceptions()
     reference = osr.SpatialReference()
