@@ -36,5 +36,5 @@ from . import towing
 __version__ = "0.1.0"
 __all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Force", "Outlines", "Picture", "Result",
            "Simulation", "budget", "capability", "converge", "design", "export", "library_path", "open_result",
-           "outlines", "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance", "quantities",
-           "report", "route", "run", "start_mpi", "statistics", "towing"]
+           "outlines", "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance",
+           "quantities", "report", "route", "run", "start_mpi", "statistics", "towing"]

@@ -132,6 +132,7 @@ void bt_bodies_skip(bt_bodies *b, bt_gid n)
     make_ids(b, n);
     for (bt_gid g = b->n_global; g < b->n_global + n; g++) b->index_of[g] = -1, b->gone[g] = 1;
     b->n_global += n;
+    b->n_kept += n;
 }
 
 bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)

@@ -121,7 +121,7 @@ static void check_cells(const bt_world *w, bt_snapshot *s)
     }
     check_direction(s, &x, in_cells, w->par.period_x, t->side_x, t->wrap_x, t->low_x, t->n_x);
     check_direction(s, &y, in_cells, w->par.period_y, t->side_y, t->wrap_y, t->low_y, t->n_y);
-    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "cells/n_x", -1,
+    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)(b->n_global - b->n_kept) + 1024, "cells/n_x", -1,
                      "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "cells/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.

@@ -236,7 +236,7 @@ static void choose(bt_world *w, double margin)
             high[1] = t->wrap_y ? t->wrap_y - 1 : coordinate(most[3], t->y0, t->side_y, 0);
         }
         const double n_x = (double)high[0] - low[0] + 1, n_y = (double)high[1] - low[1] + 1;
-        if (n_x * n_y > 4 * (double)b->n_global + 1024) continue;
+        if (n_x * n_y > 4 * (double)(b->n_global - b->n_kept) + 1024) continue;
         t->low_x = low[0], t->low_y = low[1];
         t->n_x = (int32_t)n_x, t->n_y = (int32_t)n_y;
         break;

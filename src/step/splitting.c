@@ -112,6 +112,11 @@ static centre centre_of(const bt_world *w, const bt_contact *u)
     return c;
 }
 
+static bool gives_way(const bt_world *w, int law, const bt_contact *u)
+{
+    return bt_law_on(&w->par, law) && bt_law_applies(w, law, u->a, u->b);
+}
+
 #define WEDGE (BT_PI / 3) // half angle from which on the thrust of a wedge closes the crack that it would open
 
 /// A sharp vertex of another body that goes into the floe opens it by a pair of forces along the edge: each of them per
@@ -119,7 +124,7 @@ static centre centre_of(const bt_world *w, const bt_contact *u)
 static double wedge_of(const bt_world *w, const bt_contact *u, const bt_contact_corner *corner, bool of_b)
 {
     if (corner->of != (of_b ? 0 : 1)) return 0; // the vertex is not of the other body
-    if (!bt_law_applies(w, BT_LAW_CRUSHING, u->a, u->b) && !bt_law_applies(w, BT_LAW_RAFTING, u->a, u->b)) return 0;
+    if (!gives_way(w, BT_LAW_CRUSHING, u) && !gives_way(w, BT_LAW_RAFTING, u)) return 0;
     const double wedge = bt_split_wedge(0.5 * corner->angle, u->mu);
     return 0.5 * corner->angle < WEDGE && wedge > 0 ? 1 / wedge : 0;
 }

@@ -71,12 +71,22 @@ static uint64_t mix_double(uint64_t h, double x)
     return mix(h ^ u);
 }
 
+/// What a body is called in the hash: ids that are kept for pieces count last, so that a world in which nothing splits
+/// is called as one in which nothing can.
+static uint64_t name_of(const bt_world *w, bt_gid gid)
+{
+    const bt_splitting *s = w->splitting;
+    if (!s || gid < s->first) return (uint64_t)gid;
+    if (gid >= s->first + s->reserve) return (uint64_t)(gid - s->reserve);
+    return (uint64_t)(w->bodies.n_global - s->reserve + (gid - s->first));
+}
+
 /// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
 /// names.
-static uint64_t hash_memory(const bt_memory *r)
+static uint64_t hash_memory(const bt_world *w, const bt_memory *r)
 {
     const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
-    uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ where);
+    uint64_t h = mix(mix(mix(name_of(w, r->a)) ^ name_of(w, r->b)) ^ where);
     for (int i = 0; i < r->n_points; i++) h = mix_double(mix(h ^ r->feature[i]), r->value[i]);
     return r->law > 1 ? mix_double(mix_double(h, r->value[2]), r->value[3]) : h;
 }
@@ -88,7 +98,7 @@ uint64_t bt_world_hash(const bt_world *w)
     uint64_t sum = 0;
     for (bt_idx i = 0; i < b->n; i++) {
         if (!bt_domain_owns(w, i)) continue;
-        uint64_t h = mix((uint64_t)b->gid[i]);
+        uint64_t h = mix(name_of(w, b->gid[i]));
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
         const bt_exposure *e = &b->exposure[i];
@@ -99,7 +109,7 @@ uint64_t bt_world_hash(const bt_world *w)
     }
     for (bt_idx k = 0; k < w->cells->n; k++)
         for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].laws.n_memory; i++)
-            sum += hash_memory(&w->cells->cell[k].laws.memory[i]);
+            sum += hash_memory(w, &w->cells->cell[k].laws.memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w));
     if (w->splitting && w->splitting->n > 0) sum = mix(sum ^ bt_splitting_hash(w->splitting));

@@ -25,6 +25,9 @@ def map_to_design_force(reader):
     found = json.loads((reader.folder / "out/design/statistics.json").read_text())
     assert len(found["conditions"]) == 1
     assert (reader.folder / "out/design/report.html").exists()
+    verdicts = [json.loads(p.read_text())["window"]["verdict"]
+                for p in (reader.folder / "out/design/members").glob("*/summary.json")]
+    assert sorted(verdicts) == 2 * ["not steady"] + 6 * ["steady"]  # as the page says
 
 
 def ensemble_on_a_cluster(reader):

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""Floes that split in whole runs: known answers of the law, what a split keeps, what is counted, and what files say."""
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, TOW, changed, run
+
+TOUGHNESS, STRENGTH = 150e3, 300e3
+DURATION = 1.0  # of a collision, s
+
+
+def polygon(vertices, x=0.0, y=0.0, **more):
+    return {"shape": "polygon", "vertices": [list(map(float, v)) for v in vertices], "x": x, "y": y, **more}
+
+
+def square(side, x=0.0, **more):
+    h = side / 2
+    return polygon([[-h, -h], [h, -h], [h, h], [-h, h]], x, **more)
+
+
+def wedge(side, half, x_tip, vx):
+    """An isosceles triangle with its tip, of half angle `half`, at x_tip: its weight is that of a square of this
+    side."""
+    length = side / np.sqrt(np.tan(half))  # area length² tan(half) = side²
+    y = length * np.tan(half)
+    return polygon([[2 * length / 3, 0], [-length / 3, y], [-length / 3, -y]], x_tip - 2 * length / 3, vx=vx,
+                   vy=0.0)
+
+
+def collision(floes, **keys):
+    """Floes by hand that collide in the first step, without drag. Crushing as good as rigid, done within a step: what is
+    pressed in opens a floe. Pieces do not split again."""
+    return changed({
+        "run": {"dt": 1.0, "duration": 2.0},
+        "domain": {"length": 1200, "width": 900},
+        "ice": {"concentration": 0, "thickness": 1.0, "friction": 0.1, "restitution": 0.0,
+                "drag": {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0},
+                "crushing": {"pressure": 1e9}, "splitting": {"toughness": TOUGHNESS, "generations": 1}},
+        "body": {"shape": "none"},
+        "impact": {"conversion": "duration", "duration": DURATION},
+        "output": {"frame_interval": 1.0},
+        "floes": floes}, **keys)
+
+
+def strength(length, c):
+    """Of a section, with its size effect, Pa."""
+    return STRENGTH / np.sqrt(1 + length / (c * TOUGHNESS / STRENGTH)**2)
+
+
+def wedge_force(side, half, mu=0.1):
+    """Thrust of a wedge that splits a free square of 1 m, N: the pair opens its near end, the thrust closes it."""
+    r = 2 * (np.tan(half) + mu) / (1 - mu * np.tan(half))
+    return strength(side, 0.75) * side / (4 / r - 0.75)
+
+
+def speed_for(force, side, density=910.0):
+    """Speed at which two floes of equal mass collide with this peak of a half-sine, m/s."""
+    return force * DURATION / (np.pi / 2) / (density * side**2 / 2)
+
+
+def read(folder):
+    with h5py.File(folder / "result.h5") as f:
+        return {name: data[()] for group in ("splits", "pieces") for name, data in f[group].items()}
+
+
+def hit(tmp_path, side, half, share, **keys):
+    """A wedge at a share of the speed that splits a square: the run, and its splits."""
+    x, gap = 600.0, 1e-9
+    v = share * speed_for(wedge_force(side, half), side)
+    r = run(tmp_path, collision([square(side, x + side / 2), wedge(side, half, x - gap, v)], **keys))
+    return r, read(r.dir)
+
+
+@pytest.mark.parametrize("side", [10.0, 30.0, 100.0])
+@pytest.mark.parametrize("half", np.radians([30.0, 45.0]))
+def test_a_wedge_splits_a_free_square_at_its_load(tmp_path, side, half):
+    """Both sides of the closed form, with the exponent of the size effect in it."""
+    assert len(hit(tmp_path / "below", side, half, 0.99)[1]["parent"]) == 0
+    r, made = hit(tmp_path / "above", side, half, 1.01)
+    assert made["parent"].tolist() == [0] and made["mode"].tolist() == [1] and made["generation"].tolist() == [1]
+    assert made["ratio"][0] == pytest.approx(1.01, rel=2e-3)
+    np.testing.assert_allclose(made["area"], side**2 / 2, rtol=1e-9)  # through the middle
+    np.testing.assert_allclose(made["crack"][0], [600, 0, 600 + side, 0], atol=1e-4 * side)
+    s = r.summary["splitting"]
+    assert s["splits"] == s["near"] == 1 and s["steps"] == 1
+    assert s["crack_length_m"] == pytest.approx(side, rel=1e-9)
+    assert s["fracture_work_j"] == pytest.approx(TOUGHNESS**2 * (1 - 0.3**2) / 5e9 * side, rel=1e-9)
+
+
+def test_what_a_blunt_corner_or_a_face_does(tmp_path):
+    """The thrust of a wedge of more than 60 degrees closes the crack, and a face spreads the load over the side."""
+    side = 30.0
+    v = 2 * speed_for(wedge_force(side, np.radians(45)), side)
+    blunt = run(tmp_path / "blunt", collision([square(side, 615.0), wedge(side, np.radians(66), 600.0, 0.5 * v)]))
+    face = run(tmp_path / "face", collision([square(side, 615.0), square(side, 585.0, vx=2 * v, vy=0.0)]))
+    assert blunt.summary["splitting"]["near"] == 0
+    assert face.summary["splitting"]["splits"] == 0
+
+
+def test_a_vertex_that_cannot_go_in_opens_nothing(tmp_path):
+    assert len(hit(tmp_path, 30.0, np.radians(30), 1.5, ice__crushing={})[1]["parent"]) == 0
+
+
+def test_a_split_keeps_area_momentum_and_energy(tmp_path):
+    side, share = 30.0, 1.2
+    r, made = hit(tmp_path, side, np.radians(30), share)
+    assert made["area"].sum() == pytest.approx(side**2, rel=1e-13)
+    with h5py.File(r.dir / "result.h5") as f:
+        pose, velocity = f["frames/pose"][()], f["frames/velocity"][()].astype(float)
+        area, end = f["floes/area"][()], f["frames/piece_end"][()]
+        piece, at, v = f["frames/piece"][()], f["frames/piece_pose"][()], f["frames/piece_velocity"][()].astype(float)
+    assert end.tolist()[0] == 0 and end[1] == 2 and piece[:2].tolist() == [0, 1]
+    assert np.isfinite(pose[0]).all() and np.isnan(pose[1:, 0]).all() and np.isfinite(pose[:, 1]).all()
+    mass = 910 * area
+    before = mass @ velocity[0, :2]
+    after = mass[1] * velocity[1, 1] + 910 * made["area"] @ v[:2]
+    np.testing.assert_allclose(after, before, atol=1e-6 * abs(before[0]))  # single precision
+    assert at[0, 0] == pytest.approx(at[1, 0], abs=1e-3) and at[0, 1] == pytest.approx(-at[1, 1], abs=1e-3)
+
+
+def test_an_infinite_strength_leaves_every_bit(tmp_path):
+    none = run(tmp_path / "none", TOW)
+    strong = run(tmp_path / "strong", changed(TOW, ice__splitting={"toughness": 1e9, "strength": 1e9, "least_size": 0.1}))
+    assert strong.summary["splitting"]["splits"] == 0
+    assert strong.summary["state_hash"] == none.summary["state_hash"]
+    assert strong.summary["mean_ice_resistance_n"] == none.summary["mean_ice_resistance_n"]
+
+
+def weak(**keys):
+    """Dense ice whose floes split again and again."""
+    return changed(TOW, ice__concentration=0.8, ice__size=0.9, ice__crushing={"pressure": 1e5},
+                   ice__splitting={"toughness": 100.0, "strength": 200.0, "least_size": 0.1, **keys})
+
+
+def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
+    first = run(tmp_path / "first", weak(generations=1))
+    made = read(first.dir)
+    assert first.summary["splitting"]["splits"] > 3 and made["generation"].max() == 1
+    assert first.summary["splitting"]["refused_generation"] > 0
+    again = read(run(tmp_path / "again", weak()).dir)
+    assert again["generation"].max() > 1
+    few = run(tmp_path / "few", weak(reserve=3))
+    s = few.summary["splitting"]
+    assert s["splits"] == 3 and s["refused_reserve"] > 0
+    assert "split_reserve" in [w["code"] for w in few.summary["warnings"]]
+    small = run(tmp_path / "small", weak(least_size=0.6)).summary["splitting"]
+    assert small["refused_size"] > 0 and small["largest_refused_ratio"] > 1
+
+
+def test_every_piece_has_its_parent_and_their_areas_add_up(tmp_path):
+    r = run(tmp_path, weak())
+    made = read(r.dir)
+    with h5py.File(r.dir / "result.h5") as f:
+        own = f["floes/area"][()]
+        end, piece = f["frames/piece_end"][()], f["frames/piece"][()]
+        poses = f["frames/pose"][()]
+    area = np.concatenate([own, made["area"]])
+    parents = made["parent"]
+    np.testing.assert_allclose(made["area"].reshape(-1, 2).sum(axis=1), area[parents], rtol=1e-12)
+    assert (made["area"].reshape(-1, 2)[:, 0] >= made["area"].reshape(-1, 2)[:, 1] * (1 - 1e-9)).all()
+    assert len(set(parents.tolist())) == len(parents)  # an id is of one outline, and splits once
+    gone = np.isnan(poses[-1, :, 0])
+    there = piece[end[-2]:end[-1]] + len(own)
+    assert gone.sum() == (parents < len(own)).sum()
+    assert area[:len(own)][~gone].sum() + area[there].sum() == pytest.approx(own.sum(), rel=1e-12)
+    # outlines: anticlockwise about their centroids
+    offsets, v = made["offsets"], made["vertices"]
+    for a, b, expected in zip(offsets[:-1], offsets[1:], made["area"]):
+        x, y = v[a:b].T
+        assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2 == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_reader_joins_pieces_to_the_floes(tmp_path):
+    from bergtow.result.run import Run
+    r = run(tmp_path, weak())
+    with Run(r.dir) as folder:
+        n = folder.n_floes - folder.n_pieces
+        assert folder.n_pieces == 2 * len(folder.splits["time"]) > 0
+        there = np.isfinite(folder.pose(-1)[:, 0])
+        assert np.isfinite(folder.pose(0)[:n]).all() and np.isnan(folder.pose(0)[n:]).all()
+        assert folder.area[there].sum() == pytest.approx(folder.area[:n].sum(), rel=1e-12)
+        assert (np.isfinite(folder.speed(-1)) == there).all() and len(folder.thickness) == folder.n_floes
+        assert len(folder.polygons(-1)) == folder.n_floes and np.isfinite(folder.least_contact_force(-1)).all()
+
+
+def test_paraview_sees_the_pieces(tmp_path):
+    import re
+    r = run(tmp_path, weak())
+    text = (r.dir / "frames.xdmf").read_text()
+    assert text.count('Name="pieces"') > 0
+    with h5py.File(r.dir / "result.h5") as f:
+        for size, path in re.findall(r'Dimensions="([\d ]+)"[^>]*>result\.h5:(/xdmf/\d+/piece\w+)<', text):
+            assert tuple(map(int, size.split())) == f[path].shape
+
+
+@pytest.mark.parametrize("keys, words", [
+    ({"ice__splitting": {"strength": 1e5}}, "ice.splitting.toughness"),
+    ({"ice__splitting": {"toughness": 1e5, "least_size": 5}}, "ice.splitting.least_size"),
+    ({"ice__splitting": {"toughness": 1e5}, "domain__ends": "moving"}, "moving"),
+])
+def test_bad_input_is_refused(tmp_path, keys, words):
+    assert words in run(tmp_path, changed(TOW, **keys), code=CASE).result.stderr
+
+
+def test_the_history_is_in_a_checkpoint_and_checked(tmp_path):
+    """A checkpoint whose history of splits does not fit the floes is refused."""
+    r = run(tmp_path, weak())
+    with h5py.File(r.dir / "checkpoint.h5") as f:
+        assert len(f["splits/parent"]) == r.summary["splitting"]["splits"]
+        assert len(f["splits/vertices"]) == f["splits/corners"][()].sum()
+    assert json.loads((r.dir / "summary.json").read_text())["splitting"]["unconverged_steps"] >= 0

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Floes that split: the same splits, pieces and bits on any ranks and threads, and after a kill between two splits."""
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import BERGTOW, TOW, call, changed, differing, environment, launcher, run, write_case
+
+CASE = changed(TOW, run__duration=16, ice__concentration=0.8, ice__size=0.9, ice__crushing={"pressure": 1e5},
+               ice__splitting={"toughness": 100.0, "strength": 200.0, "least_size": 0.1},
+               output__checkpoint_steps=20,
+               floes=[{"shape": "rectangle", "length": 0.9, "width": 0.5, "x": 14, "y": -3.5, "thickness": 0.04}])
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory):
+    r = run(tmp_path_factory.mktemp("one"), CASE, "--threads", 1)
+    assert r.summary["splitting"]["splits"] > 5 and r.summary["splitting"]["steps"] > 2
+    return r
+
+
+@pytest.mark.parametrize("ranks, threads", [(1, 4), (2, 1), (4, 1), (2, 2)])
+def test_ranks_and_threads_split_alike(one, tmp_path, ranks, threads):
+    path = write_case(tmp_path, CASE)
+    subprocess.run([*launcher(ranks), BERGTOW, "run", str(path), "-o", str(tmp_path / "out"), "--threads", str(threads)],
+                   env=environment(OMP_NUM_THREADS=threads), capture_output=True, check=True, timeout=240)
+    assert differing(one.dir / "result.h5", tmp_path / "out" / "result.h5") == []
+    assert (tmp_path / "out" / "summary.json").read_text().count(one.summary["state_hash"]) == 1
+
+
+def test_a_run_that_stopped_between_splits_goes_on(one, tmp_path):
+    with h5py.File(one.dir / "result.h5") as f:
+        times = np.unique(f["splits/time"][()])
+    middle = int(round(times[len(times) // 2] / CASE["run"]["dt"]))  # the step of a split; the next ones are to come
+    r = run(tmp_path, CASE, "--steps", middle, "--threads", 1)
+    done = call("resume", r.dir)
+    assert done.returncode == 0, done.stderr
+    assert differing(one.dir / "result.h5", r.dir / "result.h5") == []
+
+
+def test_a_kill_loses_nothing(one, tmp_path):
+    path = write_case(tmp_path, changed(CASE, output__checkpoint_steps=5))
+    process = subprocess.Popen([BERGTOW, "run", str(path), "-o", str(tmp_path / "out")],
+                               env=environment(OMP_NUM_THREADS=1), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    end = time.monotonic() + 60
+    while not (tmp_path / "out" / "checkpoint.h5").exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    done = call("resume", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "out" / "result.h5") as f, h5py.File(one.dir / "result.h5") as g:
+        for name in ("splits/parent", "pieces/vertices", "frames/piece_pose"):
+            assert (f[name][()] == g[name][()]).all()
