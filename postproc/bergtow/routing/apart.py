@@ -22,7 +22,8 @@ def inside(points, polygon):
 
 
 def _side(a, b, p):
-    return np.sign((b[..., 0] - a[..., 0]) * (p[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (p[..., 0] - a[..., 0]))
+    edge, rel = b - a, p - a
+    return np.sign(edge[..., 0] * rel[..., 1] - edge[..., 1] * rel[..., 0])
 
 
 def of(p, q):
@@ -40,8 +41,8 @@ def radius(polygon, centre):
 
 
 def least(body, hull, areas, enough=0.0):
-    """Least distance of a hull [n, 2], m from its centroid, to areas on its way: body [T, 3] x, y, yaw. A distance above
-    `enough` may be given too small. inf without areas."""
+    """Least distance of a hull [n, 2], m from its centroid, to areas on its way: body [T, 3] x, y, yaw. A distance
+    above `enough` may be given too small. inf without areas."""
     found, reach = np.inf, radius(hull, 0)
     for area in areas:
         bound = np.where(inside(body[:, :2], area), 0.0, to_edges(body[:, :2], area)) - reach

@@ -30,8 +30,8 @@ BUDGET = 60.0            # min
 ROUTES, MEMBERS = 3, 10
 #: errors of a map where none are said, assumed: of the hull's width, of the thickness, of the speed of the tow
 POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
-#: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line and
-#: so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards by 27°
+#: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line
+#: and so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards by 27°
 RADIUS, LENGTHS = 2.0, 2.0
 RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
 SWATH = 15.0             # hull widths: least length of a swath of --calibrate
@@ -39,7 +39,8 @@ FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "rout
 
 #: status of a plan without routes: (what is named, why, remedy)
 STATUS = {
-    "start_no_go": ("--from", "the body would lie in an area to keep out of", "start elsewhere, or take less --clearance"),
+    "start_no_go": ("--from", "the body would lie in an area to keep out of", "start elsewhere, or take less "
+                    "--clearance"),
     "goal_no_go": ("--to", "the goal lies in an area to keep out of, or too near to one for the body",
                    "choose a goal in free water, or take less --clearance"),
     "start_outside": ("--from", "the body would reach out of the domain", "start elsewhere, or enlarge the domain"),
@@ -61,13 +62,13 @@ STATUS = {
 
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
-    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, in degrees as "
-                   "20.1E,76.5N where the map has a place; X,Y:X,Y is a line, at any point of which the tow may end")
+    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, in degrees "
+                   "as 20.1E,76.5N where the map has a place; X,Y:X,Y is a line, at any point of which the tow may end")
     p.add_argument("--from", dest="start", metavar="X,Y", help="start (default: where the case has the body)")
     p.add_argument("--map", type=Path, metavar="FILE", help="the ice: outlines (.geojson) or a field (.h5) in place of "
                    "that of the case")
-    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons to keep out "
-                   "of: land, shoals, zones; may be repeated. Fixed floes of the case are such areas, too")
+    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons to keep "
+                   "out of: land, shoals, zones; may be repeated. Fixed floes of the case are such areas, too")
     p.add_argument("--clearance", metavar="M", default="0 m", help="distance to keep from them (default 0 m)")
     p.add_argument("--objective", choices=tuple(words.UNITS), default="work", help="what is to be small (default work)")
     p.add_argument("--speeds", metavar="V,V", help="speeds to choose among (default: tow.speed)")
@@ -88,11 +89,12 @@ def options(p):
     p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default 0 s)")
     p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
     p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
-                   f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
+                   f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} "
+                   "widths)")
     p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
     p.add_argument("--cell", metavar="M", help="of the raster of costs (default: an eighth of the width, or more)")
-    p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in the "
-                   "unit of the objective (default 0)")
+    p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in "
+                   "the unit of the objective (default 0)")
     p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
     p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
@@ -116,7 +118,9 @@ def _not_below(text, unit, option):
 
 def wanted(a, s):
     """Numbers of the options, in SI: {"speeds", "errors", "radius", ...}. s: Situation."""
-    speeds = sorted({_above(t, "m/s", "--speeds") for t in a.speeds.split(",")}) if a.speeds else [s.values["tow.speed"]]
+    speeds = [s.values["tow.speed"]]
+    if a.speeds:
+        speeds = sorted({_above(t, "m/s", "--speeds") for t in a.speeds.split(",")})
     if not speeds[0] > 0:
         raise RunError("tow.speed", "is 0: nothing reaches a goal", "give --speeds", CASE)
     if a.members == 1 and a.map_error is None and a.drift_error is None and a.thickness_error == THICKNESS:
@@ -174,8 +178,8 @@ def swaths(n, s, length):
                 out.append((a, b))
         if len(out) == n:
             return out
-    raise RunError("--calibrate", f"there is no room for {n} straight swaths of {length:.4g} m", "take fewer, or leave it "
-                   "out", CASE)
+    raise RunError("--calibrate", f"there is no room for {n} straight swaths of {length:.4g} m", "take fewer, or leave "
+                   "it out", CASE)
 
 
 def calibrated(a, w, s, runs):
@@ -212,8 +216,8 @@ def calibrated(a, w, s, runs):
             ratios.append(np.percentile(force, tows.PEAK) / force.mean())
         features.append(route.features)
     if len(forces) < 6:
-        raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, or "
-                       "leave --calibrate out")
+        raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, "
+                       "or leave --calibrate out")
     fit = planner.fit_weights(features, np.array(forces))
     rank = float(fit.rank_correlation)
     told = {"swaths": len(forces), "r2": float(fit.r2), "rank_correlation": rank,
@@ -332,14 +336,16 @@ def perform(a):
     s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, width)
     w = wanted(a, s)
     if w["replan"] and s.mode == "thrust":
-        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new way "
-                       "would change its tow before the look", "set tow.mode to speed or line", USAGE)
+        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
+                       "way would change its tow before the look", "set tow.mode to speed or line", USAGE)
     last = began + 60 * a.budget
     runs = tows.Tows(case.resolve(), folder, "route", program, [], a.jobs, last, last)
     found = {"case": a.case.name, "title": s.values["run.title"] or a.case.stem, "status": "ok", "set": a.set,
              "objective": a.objective, "start": s.start, "goal": goal, "speeds": w["speeds"],
-             "force_limit": w["limit"], "radius": w["radius"], "clearance": w["clearance"], "hull_width": s.hull.width,
-             "floes": len(s.ice.outlines), "drift": s.drift, "map_errors": vars(w["errors"]) | {"assumed": w["assumed"]},
+             "force_limit": w["limit"], "radius": w["radius"], "clearance": w["clearance"],
+             "hull_width": s.hull.width,
+             "floes": len(s.ice.outlines), "drift": s.drift,
+             "map_errors": vars(w["errors"]) | {"assumed": w["assumed"]},
              "calibration": None, "verdict": None, "rounds": []}
     with locked(folder / "route") as runs.lock:
         weights, factor = planner.Weights(), 1.0
@@ -356,8 +362,8 @@ def perform(a):
         files.write(found, picture=True)
         print(words.plan(writing.plain(found)))
         if plan.status == "fewer_routes":
-            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one lies a "
-                  "width apart from these.")
+            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one lies "
+                  "a width apart from these.")
         n = 1 if w["errors"].none else a.members
         seconds = estimate(program, s, some, n, a.jobs)
         found["estimate_s"] = seconds

@@ -69,7 +69,8 @@ def number(text, unit, option):
     try:
         _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
     except Exception as error:
-        raise RunError(option, str(error), "write metres of the case as X,Y, or degrees as 20.1E,76.5N", USAGE) from None
+        raise RunError(option, str(error), "write metres of the case as X,Y, or degrees as 20.1E,76.5N",
+                       USAGE) from None
     return value.value
 
 
@@ -136,8 +137,8 @@ def no_go_file(path, place):
 
 
 def own_case(path, sets, values, folder, map_file=None, force=False):
-    """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a route
-    says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the user says
+    """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a
+    route says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the user says
     of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
     merged = {}
     for file, some in reversed(files(path)):

@@ -94,7 +94,7 @@ def tug_track(route, situation):
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     new = np.append(True, np.diff(way) > 1e-9 * way[-1])
     way, x, y, heading = way[new], route.x[new], route.y[new], np.unwrap(route.heading)[new]
-    # curvature averaged over two lengths of the line with the weights of a triangle: a difference of means of the heading
+    # curvature averaged over two lengths of the line with the weights of a triangle, from means of the heading
     area = np.append(0.0, np.cumsum(np.diff(way) * (heading[1:] + heading[:-1]) / 2))
 
     def whole(at):  # of the heading, which goes on as it begins and ends

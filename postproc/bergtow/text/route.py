@@ -68,8 +68,8 @@ def answer(found):
     if code == "better":
         low, high = c["relative_95"]
         if c["fails_less"]:
-            return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in which "
-                    f"{chosen} does not.")
+            return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in "
+                    f"which {chosen} does not.")
         return (f"Take {chosen}: {objective} {percent(c['relative'])} against the straight line, "
                 f"{percent(low)} to {percent(high)} at 95 %.")
     if code == "straight_not_passable":
@@ -140,5 +140,5 @@ def rounds(found, markdown=False):
     told = "; ".join(f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}"
                      f"{'' if t['arrived'] else ' (goal missed)'}" for k, t in h["tows"].items())
     bound = ("The looks are perfect: what is gained is an upper bound. " if h["perfect"] else "")
-    return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: {told}. " \
-           f"{bound}One tow is one sample, and has no interval."
+    return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
+           f"{told}. {bound}One tow is one sample, and has no interval."
