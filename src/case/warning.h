@@ -109,7 +109,7 @@
     ROW(STAYS_RIGID, "stays_rigid", "floes", "floes in convex parts do not raft")                                      \
     ROW(THICKNESS_IDLE, "thickness_idle", "", "the thickness of the case has no effect")                               \
     ROW(SPLIT_DEFERRED, "split_deferred", "floes", "floes split a step later than their load asked for")               \
-    ROW(SPLIT_RESERVE, "split_reserve", "floes reserve", "floes could not split, as no ids were left")                  \
+    ROW(SPLIT_RESERVE, "split_reserve", "floes reserve", "floes could not split, as no ids were left")                 \
     ROW(SPLIT_UNCONVERGED, "split_unconverged", "steps of_steps", "steps that did not converge split nothing")
 
 typedef enum bt_warning {

@@ -31,8 +31,8 @@ def wedge(side, half, x_tip, vx):
 
 
 def collision(floes, **keys):
-    """Floes by hand that collide in the first step, without drag. Crushing as good as rigid, done within a step: what is
-    pressed in opens a floe. Pieces do not split again."""
+    """Floes by hand that collide in the first step, without drag. Crushing as good as rigid, done within a step: what
+    is pressed in opens a floe. Pieces do not split again."""
     return changed({
         "run": {"dt": 1.0, "duration": 2.0},
         "domain": {"length": 1200, "width": 900},
@@ -123,7 +123,8 @@ def test_a_split_keeps_area_momentum_and_energy(tmp_path):
 
 def test_an_infinite_strength_leaves_every_bit(tmp_path):
     none = run(tmp_path / "none", TOW)
-    strong = run(tmp_path / "strong", changed(TOW, ice__splitting={"toughness": 1e9, "strength": 1e9, "least_size": 0.1}))
+    keys = {"toughness": 1e9, "strength": 1e9, "least_size": 0.1}
+    strong = run(tmp_path / "strong", changed(TOW, ice__splitting=keys))
     assert strong.summary["splitting"]["splits"] == 0
     assert strong.summary["state_hash"] == none.summary["state_hash"]
     assert strong.summary["mean_ice_resistance_n"] == none.summary["mean_ice_resistance_n"]

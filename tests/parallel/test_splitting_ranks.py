@@ -26,7 +26,8 @@ def one(tmp_path_factory):
 @pytest.mark.parametrize("ranks, threads", [(1, 4), (2, 1), (4, 1), (2, 2)])
 def test_ranks_and_threads_split_alike(one, tmp_path, ranks, threads):
     path = write_case(tmp_path, CASE)
-    subprocess.run([*launcher(ranks), BERGTOW, "run", str(path), "-o", str(tmp_path / "out"), "--threads", str(threads)],
+    words = "run", str(path), "-o", str(tmp_path / "out"), "--threads", str(threads)
+    subprocess.run([*launcher(ranks), BERGTOW, *words],
                    env=environment(OMP_NUM_THREADS=threads), capture_output=True, check=True, timeout=240)
     assert differing(one.dir / "result.h5", tmp_path / "out" / "result.h5") == []
     assert (tmp_path / "out" / "summary.json").read_text().count(one.summary["state_hash"]) == 1
