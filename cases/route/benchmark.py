@@ -110,7 +110,8 @@ def main():
     write_json({"conditions": rows}, a.output / "benchmark.json", True)
     print(table(["ice, %", "width / floe", "fields", "lost to straight", "work, % (95 %)", "time, %", "peak, %",
                  "rank correlation"],
-                [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]), f"{r['lost']} of {r['planned']}",
+                [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]),
+                  f"{r['lost']} of {r['planned']}",
                   *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}"]
                  for r in rows], True))
 

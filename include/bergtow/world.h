@@ -124,7 +124,8 @@ typedef struct bt_bodies {
     bt_home *home;        ///< [n] with a moving window, otherwise NULL
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank, or no body
-    uint8_t *gone;        ///< [n_global] 1 = no body has this id, on any rank: of a floe that has split, or of no piece yet
+    /// [n_global] 1 = no body has this id, on any rank: of a floe that has split, or of no piece yet
+    uint8_t *gone;
     bt_gid n_global;      ///< ids
     bt_gid n_kept;        ///< of them, how many were kept for pieces of floes (step/splitting.h)
     bt_gid cap_global;

@@ -213,8 +213,8 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
                 dims = ("frame", of, "xy")[:frames[name].ndim]
                 put(f"{of}_{name}", dims, frames[name], None, part, long_name=meanings[name])
         for name in frames:  # of pieces of floes that split, frame after frame
-            if name.startswith("piece"):
-                put(f"frame_{name}", _dims(frames[name]), frames[name])
+            if name.startswith("piece") and (dims := _dims(frames[name])) is not None:
+                put(f"frame_{name}", dims, frames[name])
         if "line_points" in frames:
             put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
             put("branch_tension", ("frame", "branch"), frames["line_tension"])
