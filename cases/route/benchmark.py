@@ -6,7 +6,7 @@ floes, one tow each of the straight line and of the planned routes through the i
     /usr/bin/python3 cases/route/benchmark.py [-o DIR] [--fields N] [--minutes M] [--ratios 1,3,10]
 
 Goes on where it stopped: a field that is done is not towed again. Perfect knowledge of the ice: an upper bound of the
-gain. Every route is that of the planner's first choice, whatever its tow says, so that nothing is chosen after the fact.
+gain. Every route is that of the planner's first choice, whatever its tow says: nothing is chosen after the fact.
 """
 import argparse
 import contextlib
