@@ -379,7 +379,7 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
             fail_msg("scene %d: %s", scene, err.text[0]);
         c.guard.energy = 1;
         bt_guard g = {0};
-        bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 1, .n_free = 1, .mean_size = size});
+        bt_guard_begin(&g, &c, w, &r);
         for (int k = 0; k < 300; k++) {
             bt_world_step(w);
             if (!(w->stats.kinetic_energy <= g.energy * (1 + 1e-9)))
@@ -430,7 +430,7 @@ static void no_floe_is_drawn_beyond_the_scale(void **state)
     if (bt_case_finish(&c, &err) != BT_OK || bt_setup_world(&c, &f, &w, &r, &err) != BT_OK) fail_msg("%s", err.text[0]);
     c.guard.energy = 1;
     bt_guard g = {0};
-    bt_guard_begin(&g, &c, w, &(bt_roster){.n_floes = 1, .n_free = 1, .mean_size = 1});
+    bt_guard_begin(&g, &c, w, &r);
     for (int k = 0; k < 200; k++) {
         bt_world_step(w);
         assert_true(w->stats.kinetic_energy <= g.energy * (1 + 1e-9));
