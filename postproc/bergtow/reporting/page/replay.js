@@ -54,12 +54,12 @@ async function load() {
                         "later); make the page again with postproc/report.py RUN --no-compression, which any browser " +
                         "shows");
     const [x, y, yaw, speed, force] = await Promise.all(["x", "y", "yaw", "speed", "force"].map(frames));
-    const [vertices, counts, thickness, area, body] =
-        await Promise.all(["vertices", "counts", "thickness", "area", "body_pose"].map(blob));
+    const [vertices, counts, thickness, area, lives, body] =
+        await Promise.all(["vertices", "counts", "thickness", "area", "lives", "body_pose"].map(blob));
     data = {
         x, y, yaw, speed, force,
         vertices: new Float32Array(vertices), counts: new Uint16Array(counts), thickness: new Float32Array(thickness),
-        area: new Float32Array(area), body: new Float64Array(body),
+        area: new Float32Array(area), lives: new Uint32Array(lives), body: new Float64Array(body),
         offset: new Uint32Array(N + 1), radius: new Float32Array(N),
     };
     for (let i = 0; i < N; i++) {
@@ -92,6 +92,8 @@ function value(kind, frame, i) {
     return head.quanta[kind] * q * q;
 }
 
+// Floes that split, and their pieces, are there in some frames only.
+const there = (i, frame) => frame >= data.lives[2 * i] && frame < data.lives[2 * i + 1];
 const image = (d, period) => period > 0 ? d - period * Math.round(d / period) : d;
 
 // Pose of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth.
@@ -227,6 +229,7 @@ function visible(p, C, o) {
     const low = toWorld(0, canvas.height, o), high = toWorld(canvas.width, 0, o);
     const see = (x, y, r) => x + r > low[0] && x - r < high[0] && y + r > low[1] && y - r < high[1];
     for (let i = 0; i < N; i++) {
+        if (!there(i, frame)) continue;
         const pose = floePose(i, p), r = data.radius[i];
         const x = C[0] + image(pose[0] - C[0], Px), y = C[1] + image(pose[1] - C[1], Py);
         const bin = bins[level(colouring, value(colouring.kind, frame, i))];
