@@ -146,7 +146,8 @@ typedef struct { int n; const double *v; double x, y; } polygon;
 
 static polygon polygon_of(const bt_bodies *b, const bt_shore_polygon *p, const double shift[2])
 {
-    return (polygon){p->count, b->outline + 2 * (b->offset[p->gid] + p->part), p->x + shift[0], p->y + shift[1]};
+    const double *v = b->outline + 2 * (b->offset[b->index_of[p->gid]] + p->part);
+    return (polygon){p->count, v, p->x + shift[0], p->y + shift[1]};
 }
 
 static void vertex(const polygon *p, int i, double out[2])
@@ -363,9 +364,10 @@ void bt_shore_create(bt_world *w)
         c.alone = c.of->part == 0;
         if (c.alone) look_beside(w, &c);
         if (c.alone || s->first[c.of->gid] >= 0) continue;
+        const bt_idx i = b->index_of[c.of->gid];
         s->first[c.of->gid] = n_faces;
-        n_faces += b->offset[c.of->gid + 1] - b->offset[c.of->gid];
-        b->large[c.of->gid] = 1;
+        n_faces += b->offset[i + 1] - b->offset[i];
+        b->large[i] = 1;
     }
     int kept = 0;
     for (int k = 0; k < s->n; k++)

@@ -78,7 +78,7 @@ def layout(n, view, turned, lines):
 
 
 def draw(run, kind="speed", times=(), window="auto"):
-    """The figure. kind: speed, force or thickness; times: s; window: whole, body, or auto."""
+    """The figure. kind: one of COLOURS; times: s; window: whole, body, or auto."""
     shown = frames_to_show(run, times)
     follow = window == "body" or (window == "auto" and needs_window(run))
     if follow and run.towed is None:
@@ -92,12 +92,15 @@ def draw(run, kind="speed", times=(), window="auto"):
     def inches(rect):
         return rect[0] / size[0], rect[1] / size[1], rect[2] / size[0], rect[3] / size[1]
 
-    stacked, rafted = orientation == "vertical", False
+    stacked, notes = orientation == "vertical", {}
     for i, ((_, frame), rect) in enumerate(zip(shown, rects)):
         axes = figure.add_axes(inches(rect))
         scene = Scene(axes, run, colouring, view, follow)
         scene.show(frame)
-        rafted = rafted or scene.rafted
+        if scene.rafted:
+            notes["■ floes over each other"] = style.RAFTED
+        if scene.cracked:
+            notes["— cracks since the frame before"] = style.CRACK
         one_line = ", ".join(titles[i])
         axes.set_title(one_line if LETTER * len(one_line) < rect[2] else "\n".join(titles[i]))
         if not stacked:
@@ -110,10 +113,10 @@ def draw(run, kind="speed", times=(), window="auto"):
             axes.tick_params(labelleft=False)
     if run.n_floes:
         colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
-    if rafted:
-        figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right",
-                    fontsize=10.5, color=style.RAFTED)
-    style.headline(figure, run, "ice field", 0.2 / size[0], kept=2 if rafted else 0)
+    for i, (words, colour) in enumerate(notes.items()):
+        figure.text(1 - 0.2 / size[0], 1 - (0.42 + 0.2 * i) / size[1], words, va="top", ha="right", fontsize=10.5,
+                    color=colour)
+    style.headline(figure, run, "ice field", 0.2 / size[0], kept=2 if notes else 0)
     return figure
 
 

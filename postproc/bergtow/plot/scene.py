@@ -8,7 +8,7 @@ A view is (x0, x1, y0, y1) in m of the world frame, or relative to the towed bod
 """
 import numpy as np
 from matplotlib import patheffects
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
@@ -19,7 +19,7 @@ from bergtow.plot import style
 from bergtow.result import overlaps as rafted
 from bergtow.result.run import place
 
-COLOURS = ("speed", "force", "thickness")
+COLOURS = ("speed", "force", "thickness", "generation")
 
 
 class Colouring:
@@ -28,8 +28,12 @@ class Colouring:
     def __init__(self, run, kind, frames):
         self.run, self.kind = run, kind
         samples = np.concatenate([self._raw(i) for i in frames]) if run.n_floes else np.zeros(1)
-        unit, power, self.extend = {"speed": "m/s", "force": "N", "thickness": "m"}[kind], 1.0, "neither"
-        if kind == "thickness":
+        samples = samples[np.isfinite(samples)]
+        unit, power, self.extend = {"speed": "m/s", "force": "N", "thickness": "m", "generation": "1"}[kind], 1.0, \
+            "neither"
+        if kind == "generation":
+            low, high = 0.0, max(1.0, float(run.generation.max(initial=0)))
+        elif kind == "thickness":
             low, high = float(samples.min()), float(samples.max())
             if high - low < 1e-9 * high:  # one thickness: the white end of the map
                 low, high = 0.0, high
@@ -47,13 +51,15 @@ class Colouring:
         self.factor, unit = style.scale([high], unit) if kind == "force" else (1.0, unit)
         low, high = low / self.factor, (high or 1.0) / self.factor
         self.norm = Normalize(low, high, clip=True) if power == 1.0 else PowerNorm(power, low, high, clip=True)
-        self.cmap = {"speed": style.SPEED_MAP, "force": style.FORCE_MAP, "thickness": style.THICKNESS_MAP}[kind]
+        self.cmap = {"speed": style.SPEED_MAP, "force": style.FORCE_MAP}.get(kind, style.THICKNESS_MAP)
         self.label = {"speed": f"floe speed ({unit})", "force": f"largest contact force on the floe ({unit})",
-                      "thickness": f"ice thickness ({unit})"}[kind]
+                      "thickness": f"ice thickness ({unit})", "generation": "splits that made the floe"}[kind]
 
     def _raw(self, frame):
         if self.kind == "thickness":
             return self.run.thickness
+        if self.kind == "generation":
+            return self.run.generation
         return self.run.speed(frame) if self.kind == "speed" else self.run.least_contact_force(frame)
 
     def values(self, frame):
@@ -70,6 +76,9 @@ class Colouring:
             top = self.norm.vmax
             ticks = _round_steps(top)
             bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
+        if self.kind == "generation":
+            bar.locator = MaxNLocator(integer=True)
+            bar.update_ticks()
         return bar
 
 
@@ -212,6 +221,9 @@ class Scene:
         self._rafts = run.value("ice.rafting.kappa", 0) > 0
         for collection in (self._floes, self._rafted):
             collection.set_rasterized(run.n_floes > style.MANY / 6)
+        self.cracked = False  #: have floes split since the frame before the one that is shown?
+        self._cracks = LineCollection([], colors=style.CRACK, linewidths=float(np.clip(0.12 * floe_pt, 0.8, 2.0)),
+                                      zorder=2.7, **kept)
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
         self._solid.set_facecolors([style.WALL if b.wall else style.FIXED for b in run.bodies if not b.towed]
                                    * len(self._images))
@@ -232,12 +244,13 @@ class Scene:
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
         self.artists = [
-            self._water, self._floes, self._rafted, self._track, self._solid, *edges, self._line, self._body,
+            self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line, self._body,
             self._arrow
         ]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
         axes.add_collection(self._rafted, autolim=False)
+        axes.add_collection(self._cracks, autolim=False)
         axes.add_line(self._track)
         axes.add_collection(self._solid, autolim=False)
         axes.add_line(self._line)
@@ -272,6 +285,10 @@ class Scene:
             over = rafted.overlaps(outlines)
             self._rafted.set_verts([self._flat(p - origin) for p in over])
             self.rafted = len(over) > 0
+        if run.n_pieces:
+            cracks = self._new_cracks(frame, position + self._middle if self.follow else None)
+            self._cracks.set_segments(self._flat(cracks - origin))
+            self.cracked = len(cracks) > 0
         bodies = run.body_polygons(frame, centre)
         self._solid.set_verts([self._flat(p + shift - origin) for shift in self._images
                                for p, b in zip(bodies, run.bodies) if not b.towed])
@@ -284,6 +301,17 @@ class Scene:
         if self._heading is not None:
             self._heading = tow_heading(run, run.frame_times[frame])
             self._show_arrow(position - origin, bodies[run.towed] - origin)
+
+    def _new_cracks(self, frame, centre):
+        """[K, 2, 2] m, ends of the cracks since the frame before, where they opened. Older ones have gone with their
+        pieces, as gaps between them."""
+        run = self.run
+        frame %= run.n_frames
+        after, until = run.frame_times[frame - 1] if frame else -np.inf, run.frame_times[frame]
+        some = (run.splits["time"] > after) & (run.splits["time"] <= until)
+        cracks = run.splits["crack"][some].reshape(-1, 2, 2)
+        middle = cracks.mean(axis=1)
+        return cracks + (run.wrap(middle, centre) - middle)[:, None]
 
     def _edges(self, **kept):
         """Dashed lines along the edges of the domain that are open or periodic."""

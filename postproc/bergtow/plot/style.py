@@ -22,6 +22,7 @@ PAPER = "#ffffff"
 INK = "#1d2733"
 FAINT = "#66727f"
 GRID = "#dfe5ea"
+CRACK = "#ff2f4e"
 WALL = "#8a949e"
 FIXED = "#5f6871"
 BODY = "#12b3a6"
@@ -107,7 +108,7 @@ def conditions(run):
     if run.n_floes and np.isfinite(concentration):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
-        words.append(f"{run.n_floes} floes")
+        words.append(f"{run.n_floes - run.n_pieces} floes")
         # floes of their own thickness
         if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
             words.append(f"{np.mean(run.thickness):.3g} m thick")

@@ -48,17 +48,27 @@ def thinned(n, most):
 
 
 def read_frames(run, frames, floes):
-    """(x, y, yaw, speed, force), each [T, N], of some floes in some frames; positions wrapped into the domain."""
+    """(x, y, yaw, speed, force), each [T, N], of some floes in some frames; positions wrapped into the domain. And
+    lives [N, 2]: the first frame, as a place in frames, in which a floe is there, and the first after it in which it is
+    not. Where it is not it has the numbers of the frame next to it."""
     out = np.empty((5, len(frames), len(floes)))
+    lives = np.tile([0, len(frames)], (len(floes), 1))
     for k, frame in enumerate(frames):
         pose = run.pose(frame)[floes]
         pose[:, :2] = run.wrap(pose[:, :2])
         out[0, k], out[1, k], out[2, k] = pose.T
         out[3, k], out[4, k] = run.speed(frame)[floes], run.least_contact_force(frame)[floes]
+    if run.n_pieces:
+        there = np.isfinite(out[0])
+        count = there.sum(axis=0)
+        lives[:, 0] = np.where(count > 0, there.argmax(axis=0), 0)
+        lives[:, 1] = lives[:, 0] + count
+        nearest = np.clip(np.arange(len(frames))[:, None], lives[:, 0], np.maximum(lives[:, 1] - 1, lives[:, 0]))
+        out = np.where(count > 0, np.take_along_axis(out, nearest[None], axis=1), 0)
     if not np.isfinite(out).all():
         raise RunError(run.result, "/frames holds values that are not finite",
                        "the file is damaged: run the case again")
-    return out
+    return out, lives
 
 
 def quantise(x, low, high, period):
@@ -82,7 +92,7 @@ def nearest_floes(run, frames, n):
     least = np.full(run.n_floes, np.inf)
     for frame in frames:
         body = run.body_pose(frame)[run.towed, :2]
-        least = np.minimum(least, np.hypot(*(run.wrap(run.pose(frame)[:, :2], body) - body).T))
+        least = np.fmin(least, np.hypot(*(run.wrap(run.pose(frame)[:, :2], body) - body).T))
     return np.sort(np.argsort(least, kind="stable")[:n])
 
 
@@ -143,7 +153,7 @@ class Replay:
 
     def _pack(self, frames, floes):
         run = self.run
-        x, y, yaw, speed, force = read_frames(run, frames, floes)
+        (x, y, yaw, speed, force), self.lives = read_frames(run, frames, floes)
         self.quanta, numbers = {}, {}
         for axis, name, values in ((0, "x", x), (1, "y", y)):
             period = run.period[axis]
@@ -185,6 +195,7 @@ class Replay:
         self.blobs["counts"] = pack(counts.astype(np.uint16), self.compress)
         self.blobs["thickness"] = pack(run.thickness[floes].astype(np.float32), self.compress)
         self.blobs["area"] = pack(run.area[floes].astype(np.float32), self.compress)
+        self.blobs["lives"] = pack(self.lives.astype(np.uint32), self.compress)
 
     def _colourings(self, frames):
         """What the floes can be coloured by: label, upper and lower limit in SI, power of the scale, 64 colours; as in

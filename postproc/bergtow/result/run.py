@@ -527,6 +527,14 @@ class Run:
         return self._once("splits", lambda: {name: self._read(f"splits/{name}") for name in group})
 
     @property
+    def generation(self):
+        """[N] how many splits in a row made each floe: 0 of those that were there from the start."""
+        made = np.zeros(self.n_floes, int)
+        if self.n_pieces:
+            made[-self.n_pieces:] = np.repeat(self.splits["generation"], 2)
+        return made
+
+    @property
     def vertices(self):
         """[V, 2] m, outlines of all floes one after the other, body frame."""
         return self._floes()[0]
@@ -718,13 +726,15 @@ class Run:
     def polygon_array(self, frame, centre=None):
         """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
 
-        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. The first N rows are the
-        floes in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
+        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. First come the floes that are
+        there, in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
         """
         pose = self.pose(frame)
         pose[:, :2] = self.wrap(pose[:, :2], centre)
         outlines = self._world(pose)[self._padding] if self.n_floes else np.zeros((0, 1, 2))
-        index = np.arange(self.n_floes)
+        index = np.flatnonzero(np.isfinite(pose[:, 0]))
+        if len(index) < self.n_floes:
+            outlines = outlines[index]
         x0, x1, y0, y1 = self.box
         middle = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
         for axis, period in enumerate(self.period):

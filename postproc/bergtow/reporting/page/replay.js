@@ -56,12 +56,12 @@ async function load() {
                         "later); make the page again with postproc/report.py RUN --no-compression, which any browser " +
                         "shows");
     const [x, y, yaw, speed, force] = await Promise.all(["x", "y", "yaw", "speed", "force"].map(frames));
-    const [vertices, counts, thickness, area, body] =
-        await Promise.all(["vertices", "counts", "thickness", "area", "body_pose"].map(blob));
+    const [vertices, counts, thickness, area, lives, body] =
+        await Promise.all(["vertices", "counts", "thickness", "area", "lives", "body_pose"].map(blob));
     data = {
         x, y, yaw, speed, force,
         vertices: new Float32Array(vertices), counts: new Uint16Array(counts), thickness: new Float32Array(thickness),
-        area: new Float32Array(area), body: new Float64Array(body),
+        area: new Float32Array(area), lives: new Uint32Array(lives), body: new Float64Array(body),
         offset: new Uint32Array(N + 1), radius: new Float32Array(N),
     };
     let most = 4;
@@ -98,6 +98,8 @@ function value(kind, frame, i) {
     return head.quanta[kind] * q * q;
 }
 
+// Floes that split, and their pieces, are there in some frames only.
+const there = (i, frame) => frame >= data.lives[2 * i] && frame < data.lives[2 * i + 1];
 const image = (d, period) => period > 0 ? d - period * Math.round(d / period) : d;
 
 // Pose [x, y, yaw] of floe i at the playhead, as stored (wrapped into the domain), between frames if smooth; in `out`.
@@ -249,10 +251,11 @@ function path(g, outline, pose, o) {
 
 // What is in view of the floes, images of those that reach over the edge among them: {n, floe, at: x, y, yaw of each}.
 function visible(p, C, o) {
-    const pose = [0, 0, 0];
+    const pose = [0, 0, 0], frame = nearest();
     const low = toWorld(0, canvas.height, o), high = toWorld(canvas.width, 0, o);
     let n = 0;
     for (let i = 0; i < N; i++) {
+        if (!there(i, frame)) continue;
         floePose(i, p, pose);
         const r = data.radius[i], x = C[0] + image(pose[0] - C[0], PX), y = C[1] + image(pose[1] - C[1], PY);
         const ex = PX > 0 && Math.abs(x - C[0]) + r > PX / 2 ? (x > C[0] ? -PX : PX) : 0;

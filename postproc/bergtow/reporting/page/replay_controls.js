@@ -270,6 +270,7 @@ function inside(i, x, y, pose) {
 function floeAt(sx, sy) {
     const p = playhead(), C = centre(p), [x, y] = toWorld(sx, sy, origin(p));
     for (let i = 0; i < N; i++) {
+        if (!there(i, nearest())) continue;
         const pose = floePose(i, p);
         const dx = image(x - pose[0], head.period[0]), dy = image(y - pose[1], head.period[1]);
         if (Math.hypot(dx, dy) <= data.radius[i] && inside(i, pose[0] + dx, pose[1] + dy, pose)) return i;
