@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Routes on the map: the ice as the planner saw it, areas to keep out of, and the ways of the body and of the vessel."""
+"""Routes on the map: the ice as the planner saw it, areas to keep out of, the ways of the body and of the vessel."""
 from bergtow.plot import style
 
 import numpy as np

@@ -31,7 +31,8 @@ ROUTES, MEMBERS = 3, 10
 #: errors of a map where none are said, assumed: of the hull's width, of the thickness, of the speed of the tow
 POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
 #: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line
-#: and so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards by 27°
+#: and so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards
+#: by 27°
 RADIUS, LENGTHS = 2.0, 2.0
 RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
 SWATH = 15.0             # hull widths: least length of a swath of --calibrate
@@ -86,7 +87,8 @@ def options(p):
     p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
                    "swaths towed through the map first, at least 6 (default 0: none)")
     p.add_argument("--replan", metavar="S", help="look at the ice anew after every S of the tow and plan the rest")
-    p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default 0 s)")
+    p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default "
+                   "0 s)")
     p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
     p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
                    f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} "
@@ -362,8 +364,8 @@ def perform(a):
         files.write(found, picture=True)
         print(words.plan(writing.plain(found)))
         if plan.status == "fewer_routes":
-            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one lies "
-                  "a width apart from these.")
+            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one "
+                  "lies a width apart from these.")
         n = 1 if w["errors"].none else a.members
         seconds = estimate(program, s, some, n, a.jobs)
         found["estimate_s"] = seconds
@@ -386,6 +388,13 @@ def verify(a, w, s, goal, some, n, runs, files, found):
     runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
+    clock, made = time.monotonic(), runs.made
+    tow(runs, some[0].name, range(1), some[0].keys)
+    if runs.made > made:  # what the first tow took is a better scale than the estimate of `bergtow check`
+        ways = sum(float(c.keys["run.duration"].split()[0]) for c in some) / float(
+            some[0].keys["run.duration"].split()[0])
+        found["estimate_by_tow_s"] = (time.monotonic() - clock) * ways * -(-n // a.jobs)
+        print(f"by the first tow: {words.amount(found['estimate_by_tow_s'], 's')} in all\n")
     for c in some:
         why = tow(runs, c.name, range(n), c.keys)
         if SPENT in why:

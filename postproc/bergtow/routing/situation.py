@@ -138,8 +138,8 @@ def no_go_file(path, place):
 
 def own_case(path, sets, values, folder, map_file=None, force=False):
     """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a
-    route says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the user says
-    of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
+    route says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the
+    user says of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
     merged = {}
     for file, some in reversed(files(path)):
         some = {k: v for k, v in some.items() if k != "base"}
