@@ -16,7 +16,7 @@ import tables
 
 ROOT = Path(__file__).resolve().parents[1]
 LINK = re.compile(r"!?\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
-FOLDERS = ("basin", "field", "fullscale", "outlines", "studies", "validation", "scaling")
+FOLDERS = ("basin", "field", "fullscale", "outlines", "route", "studies", "validation", "scaling")
 
 
 def links(page):

@@ -5,13 +5,15 @@ floes, one tow each of the straight line and of the planned routes through the i
 
     /usr/bin/python3 cases/route/benchmark.py [-o DIR] [--fields N] [--minutes M] [--ratios 1,3,10]
 
-Goes on where it stopped: a field that is done is not towed again. Perfect knowledge of the ice: an upper bound of the
-gain. Every route is that of the planner's first choice, whatever its tow says: nothing is chosen after the fact.
+Goes on where it stopped: a field that is done is not towed again. Perfect knowledge of the ice: an upper bound of
+the gain. Every route is that of the planner's first choice, whatever its tow says, so that nothing is chosen after
+the fact.
 """
 import argparse
 import contextlib
 import io
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -21,6 +23,7 @@ import scipy.stats
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1] / "postproc"))
+os.environ.setdefault("BERGTOW", str(HERE.parents[1] / "build/release/bergtow"))
 import bergtow  # noqa: E402
 from bergtow.stats.mean import t_interval  # noqa: E402
 from bergtow.table import table  # noqa: E402
@@ -83,7 +86,8 @@ def row(concentration, ratio, some):
 
 
 def percent(mean, ends):
-    return f"{100 * mean:+.1f} ({100 * ends[0]:+.1f} to {100 * ends[1]:+.1f})"
+    return "–" if mean != mean else f"{100 * mean:+.1f}" + (
+        "" if ends[0] != ends[0] else f" ({100 * ends[0]:+.1f} to {100 * ends[1]:+.1f})")
 
 
 def main():
@@ -111,8 +115,8 @@ def main():
     print(table(["ice, %", "width / floe", "fields", "lost to straight", "work, % (95 %)", "time, %", "peak, %",
                  "rank correlation"],
                 [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]),
-                  f"{r['lost']} of {r['planned']}",
-                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}"]
+                  f"{r['lost']} of {r['planned']}", *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES),
+                  f"{r['rank_correlation']:.2f}"]
                  for r in rows], True))
 
 

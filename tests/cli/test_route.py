@@ -335,6 +335,7 @@ def test_a_route_is_a_case(routed, tmp_path):
 
 
 def without_clocks(found):
+    found = {k: v for k, v in found.items() if k != "estimate_by_tow_s"}
     return json.loads(re.sub(r'"(plan_s|tows_s|estimate_s|wall_s)": [\d.e+-]+', r'"\1": 0', json.dumps(found)))
 
 

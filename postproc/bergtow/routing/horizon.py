@@ -3,7 +3,7 @@
 
 Every look is a tow from the start up to that time, along the way that was decided by then; a new plan leaves that way
 as it is, so that the tow up to the look is the same, to the bit, and the last one is a single case from start to goal.
-Rejected: to begin anew with the ice as it lies. The floes would come to rest at every look.
+Rejected: to begin anew with the ice as it lies, for the floes would come to rest at every look.
 
 The ice of the tow is that of the case. A look sees its floes as they lay `age` before, carried on with the mean drift,
 with the errors of the map. With neither age nor errors the look is perfect, which no one has: the gain is an upper

@@ -87,8 +87,8 @@ def options(p):
     p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
                    "swaths towed through the map first, at least 6 (default 0: none)")
     p.add_argument("--replan", metavar="S", help="look at the ice anew after every S of the tow and plan the rest")
-    p.add_argument("--map-age", metavar="S", default="0 s",
-                   help="age of the map at each look of --replan (default 0 s)")
+    p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default "
+                   "0 s)")
     p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
     p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
                    f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} "
@@ -388,6 +388,13 @@ def verify(a, w, s, goal, some, n, runs, files, found):
     runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
+    clock, made = time.monotonic(), runs.made
+    tow(runs, some[0].name, range(1), some[0].keys)
+    if runs.made > made:  # what the first tow took is a better scale than the estimate of `bergtow check`
+        ways = sum(float(c.keys["run.duration"].split()[0]) for c in some) / float(
+            some[0].keys["run.duration"].split()[0])
+        found["estimate_by_tow_s"] = (time.monotonic() - clock) * ways * -(-n // a.jobs)
+        print(f"by the first tow: {words.amount(found['estimate_by_tow_s'], 's')} in all\n")
     for c in some:
         why = tow(runs, c.name, range(n), c.keys)
         if SPENT in why:

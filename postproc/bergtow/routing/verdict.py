@@ -3,8 +3,9 @@
 
 The best of several looks better than it is, in the very members by which it was found to be the best. So one half of
 the members chooses, and the other half judges: the interval is of the paired differences to the straight line in
-members that had no part in the choice. A tow fails where it misses the goal, touches an area to keep out of, parts its
-line, or exceeds the limit of force; tows are ranked by their failures first, and by the mean of the objective then.
+members that had no part in the choice. A tow fails where it misses the goal, touches an area to keep out
+of, parts its line, or exceeds the limit of force; tows are ranked by their failures first, and by the mean of the
+objective then.
 """
 from bergtow.stats.mean import LEVEL, t_interval
 
