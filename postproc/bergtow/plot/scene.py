@@ -244,8 +244,8 @@ class Scene:
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
         self.artists = [
-            self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line, self._body,
-            self._arrow
+            self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line,
+            self._body, self._arrow
         ]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
