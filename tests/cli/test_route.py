@@ -248,8 +248,8 @@ def test_work_in_open_water_is_known(tmp_path):
 # ---- an honest choice
 
 
-def made_up(name, values, straight=False, **more):
-    c = SimpleNamespace(name=name, straight=straight, route=SimpleNamespace(faults=()))
+def made_up(name, values, straight=False, cost=1.0, **more):
+    c = SimpleNamespace(name=name, straight=straight, route=SimpleNamespace(faults=(), cost=cost))
     rows = [{"arrived": True, "work": v, "no_go_contact": False, "limit_exceeded": False, "parted": False,
              "slack": False} | more for v in values]
     return c, rows
@@ -269,7 +269,10 @@ def test_one_half_chooses_and_the_other_judges():
     v = judged(straight, made_up("b", [4] * 4 + [1.0, 1, 1, 2]), good_first)
     assert v["chosen"] == v["recommended"] == "b" and v["code"] == "better"
     assert v["compared"]["b"]["difference_95"][1] < 0
-    assert judged(straight, good_first)["planner_best"]["lost"] == 3  # 12 > 10, 12 > 11, 15 > 13
+    best = judged(straight, made_up("a", [5] * 4 + [12.0, 12, 12, 15], cost=0.9))["planner_best"]
+    assert best["lost"] == 3 and not best["straight"]  # 12 > 10, 12 > 11, 15 > 13
+    assert judged(straight, made_up("a", [50] * 8, cost=2.0))["planner_best"] == {
+        "name": "straight", "members": 8, "straight": True, "lost": 0}
 
 
 def test_the_best_of_many_that_are_alike_is_seldom_recommended():

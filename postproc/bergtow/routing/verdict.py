@@ -83,10 +83,10 @@ def of(candidates, outcomes, objective):
         return out | {"code": "straight_not_passable", "recommended": others[0].name if passable else None}
     straight = outcomes[lines[0].name]
     out["compared"] = {c.name: compared(outcomes[c.name], straight, judge, objective) for c in order}
-    first = next(c for c in candidates if not c.straight)
+    first = min((c for c in candidates if c in lines or not c.straight), key=lambda c: c.route.cost)
     values = [(value(outcomes[first.name][i], objective), value(straight[i], objective)) for i in range(n)]
     out["planner_best"] = {"name": first.name, "members": n,
-                           "lost": sum(np.isfinite(b) and not a <= b for a, b in values)}
+                           "straight": first.straight, "lost": sum(np.isfinite(b) and not a <= b for a, b in values)}
     if n < 2:
         return out | {"code": "one_member"}
     better = shown(out["compared"][others[0].name])

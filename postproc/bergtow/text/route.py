@@ -104,8 +104,8 @@ def meaning(found):
                    f"{' (assumed)' if e['assumed'] else ''}, the same for every route. "
                    f"Members {span(v['chose'])} chose, members {span(v['judged'])} judged: the intervals are theirs. ")
     best = v.get("planner_best")
-    lost = f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. " \
-        if best else ""
+    lost = "" if not best else "By prediction the straight line is the best. " if best["straight"] else \
+        f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. "
     c = found.get("calibration")
     fit = "" if not c else calibration(c) + " "
     return members + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
