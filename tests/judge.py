@@ -18,7 +18,7 @@ def may_be_null(path, case, summary):
     window = summary["window"]["n_samples"]
     reference = value_of(case, "reference.mean_force")
     rules = (
-        (r"title|stopped|lead|reference|.*\.source", True),
+        (r"title|stopped|lead|splitting|reference|.*\.source", True),
         (r"estimate_labels", not body),
         (r"start_peak_.*|.*\.start_peak_n", True),  # no step before the window
         (r"outlines\.origin_.*", True),
@@ -98,8 +98,15 @@ def judge_result(case, folder, whole=True):
                 good |= f["series/no_load"][:] > 0
             if not good.all():
                 wrong.append(f"series {name}, {series.attrs['applies']}: {x[~good][:3]}")
+        there = np.isfinite(f["frames/pose"][()]).all(axis=2)  # but for floes that have split
+        split = [p for p in f["splits/parent"][()] if p < there.shape[1]] if "splits" in f else []
+        if (~there).any(axis=0).nonzero()[0].tolist() != sorted(split) and not (~there[-1:]).sum() <= len(split):
+            wrong.append("frames pose: not finite")
         for name in ("pose", "contact_force", "net_force", "body_pose", "speed"):
-            if not np.isfinite(f["frames"][name][()]).all():
+            x = f["frames"][name][()]
+            floes = x[:, :there.shape[1]] if name != "body_pose" else x[:, :0]
+            if not (np.isfinite(floes[there[:, :floes.shape[1]]]).all()
+                    and np.isfinite(x[:, floes.shape[1]:]).all()):
                 wrong.append(f"frames {name}: not finite")
         pose, floes = f["frames/pose"][()], f["floes/offsets"].shape[0] - 1
         for name in ("impacts", "panels"):
@@ -117,7 +124,8 @@ def judge_result(case, folder, whole=True):
     if summary["n_floes"] != floes:
         wrong.append(f"{summary['n_floes']} floes in the summary, {floes} outlines")
     wrong += [f"summary {p}: null" for p, x in numbers(summary) if x is None and not may_be_null(p, case, summary)]
-    return wrong + judge_guards(case, folder, summary, pose[-1])
+    last = pose[-1][np.isfinite(pose[-1][:, 0])] if len(pose) else pose[-1]
+    return wrong + judge_guards(case, folder, summary, last)
 
 
 def resolved(folder, key):

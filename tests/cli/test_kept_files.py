@@ -49,6 +49,7 @@ CALLS = [
     ("capability", ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
     ("route", ["case.yml", "--to", "12,0", "--plan-only", "--routes", "1", "-o", "."],
      ["routes.geojson", "route.json", "route.png", "straight.yml"]),
+    ("export", ["RUN", "-o", "a.geojson"], ["a.geojson"]),
     ("outlines", ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
      ["a.geojson", "a.json", "a.png"]),
     ("design", ["case.yml", "-o", "."], ["answer.json", "design.yml", "report.html", "report.pdf", "replay.html"]),
@@ -157,7 +158,9 @@ def test_a_reader_that_leaves(quick, tmp_path, command, words, files):
                           env=os.environ | {"PYTHONUNBUFFERED": "1"})
     os.close(writer)
     assert all((tmp_path / name).stat().st_size > 0 for name in files), done.stderr
-    assert done.returncode == 4 and len(done.stderr.splitlines()) == 1, done.stderr
+    # on a busy machine it says what it is at
+    told = [line for line in done.stderr.splitlines() if not re.match(r"bergtow \w+: \d+ s: ", line)]
+    assert done.returncode == 4 and len(told) == 1, done.stderr
     assert "standard output: cannot be written" in done.stderr
 
 

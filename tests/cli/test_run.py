@@ -24,7 +24,7 @@ NUMBERS = (
     "mean_sweeps "
     "contacts_mean ns_per_floe_step momentum_residual").split()
 WHOLE = "n_floes n_steps ranks threads unconverged_steps".split()
-PHASES = "detect colour forces solve advance exchange output project".split()
+PHASES = "detect colour forces solve advance exchange output project split".split()
 CALL = "program ice world record steps end".split()
 SERIES = "time tow_force ice_resistance drag_force body_x body_y body_yaw contacts sweeps residual".split()
 

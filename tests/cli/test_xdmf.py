@@ -123,7 +123,7 @@ def test_summary_is_json_with_every_promised_number(run):
         p95_ice_resistance_n p99_ice_resistance_n peak_ice_resistance_n sd_ice_resistance_n""".split()
     for name in numbers:
         assert isinstance(summary[name], (int, float)), name
-    assert list(summary["phases_s"]) == "detect colour forces solve advance exchange output project".split()
+    assert list(summary["phases_s"]) == "detect colour forces solve advance exchange output project split".split()
     assert summary["state_hash"] == "0123456789abcdef"
     assert summary["title"] == 'quote " backslash \\ newline \n and byte \ufffd end'
     assert summary["reference"]["source"] == "made up é"

@@ -115,7 +115,7 @@ def parts_of(e, rows, value, wind):
         x = e.summary.get(key, np.full(e.n, np.nan))[rows]
         return float(np.nanmean(x)) if np.isfinite(x).any() else 0.0
     drag = mean("mean_drag_force_n")
-    water = mean("estimates_open_water_drag_force_n") if wind else drag
+    water = mean(f"estimates_{load_cases.drag_estimate()}_force_n") if wind else drag
     out = {name: {"water": water, "wind": drag - water}[name] if key is None else mean(key)
            for name, key in PARTS}
     out["fluctuation"] = value - sum(out.values()) if np.isfinite(value) else np.nan

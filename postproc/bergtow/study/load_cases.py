@@ -21,10 +21,12 @@ Angle and radius of the bend are assumed unless the call gives them, and so are 
 - a head current of half the speed doubles the drag - so where they are assumed the row stands beside the design value,
 and is not in it.
 """
+import functools
 import math
 from dataclasses import dataclass
 
 from bergtow import towing
+from bergtow.case import quantities
 from bergtow.result.run import Run, case_value, within
 from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
@@ -111,9 +113,15 @@ class Runs:
         return out
 
 
+@functools.cache
+def drag_estimate():
+    """The name of the estimate of the drag in open water, which comes on top of the ice resistance."""
+    return next(e["name"] for e in quantities()["estimates"] if e["kind"] == "on top")
+
+
 def mean_parts(run):
     """Mean ice resistance and water speed in the window of a run, its drag of the water and its whole drag."""
-    water = run.number("estimates.open_water_drag.force_n")
+    water = run.number(f"estimates.{drag_estimate()}.force_n")
     return {"ice": float(run.number("mean_ice_resistance_n")), "water": water,
             "drag": run.number("mean_drag_force_n")}
 
