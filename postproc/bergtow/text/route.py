@@ -8,7 +8,7 @@ FAULTS = {"missed": "misses the goal", "no_go_contact": "touches an area to keep
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
 PLANNED = {"no_go": "crosses an area to keep out of", "outside": "leaves the domain",
-           "force_limit": "exceeds the force limit by prediction"}
+           "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
 
 def amount(x, unit):
