@@ -59,7 +59,7 @@ def with_point(points, way):
 
 def best(plan, heading=None, headings=32):
     """The cheapest route of a plan that is allowed; None where there is none. heading: of the tow at a look, rad, which
-    the straight line may leave by half a step of the lattice's headings: no route of the lattice starts nearer to it."""
+    the straight line may leave by half a step of the lattice's headings: none of the lattice is sure to be nearer."""
     def allowed(r):
         if set(r.faults) <= {"turns"} and heading is not None:
             off = (r.heading[0] - heading + np.pi) % (2 * np.pi) - np.pi
