@@ -134,7 +134,8 @@ def rounds(found, markdown=False):
     """The receding horizon."""
     h = found["horizon"]
     head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
-    rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"), amount(r["length"], "m"), amount(r["work"], "J"),
+    rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),
+             amount(r["length"], "m"), amount(r["work"], "J"),
              r["status"]] for r in found["rounds"]]
     names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
     told = "; ".join(f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}"
