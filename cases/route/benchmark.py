@@ -116,8 +116,8 @@ def main():
     print(table(["ice, %", "width / floe", "fields", "straight is planned", "lost to straight",
                  "less work, % (95 %)", "less time, %", "lower peak, %", "rank correlation"],
                 [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]),
-                  str(r["straight"]), f"{r['lost']} of {r['fields'] - r['straight']}", *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES),
-                  f"{r['rank_correlation']:.2f}"]
+                  str(r["straight"]), f"{r['lost']} of {r['fields'] - r['straight']}",
+                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}"]
                  for r in rows], True))
 
 

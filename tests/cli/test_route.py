@@ -19,7 +19,7 @@ from harness import BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed
 import bergtow
 from bergtow.errors import RunError
 from bergtow.result.run import Run
-from bergtow.routing import apart, members, situation, tows, verdict
+from bergtow.routing import apart, horizon, members, situation, tows, verdict
 
 BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
                 body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
@@ -414,6 +414,17 @@ def test_the_function_is_the_command(routed, tmp_path):
         assert mine["waypoints"] == theirs["waypoints"] and mine["predicted"] == theirs["predicted"]
     line = bergtow.route(routed.folder / "case.yml", tmp_path / "line", to=((8.5, -0.5), (8.5, 0.5)), plan_only=True)
     assert line["goal"] == [[8.5, -0.5], [8.5, 0.5]] and line["routes"][0]["predicted"]["length"] <= 6.0001
+
+
+def test_at_a_look_the_straight_line_may_turn_a_little():
+    """By half a step of the headings. Red: a plan of which the straight line is all is none, or any corner will do."""
+    def straight(heading, *faults):
+        return SimpleNamespace(faults=faults, cost=1.0, heading=np.array([heading]))
+    def found(r, *at):
+        return horizon.best(SimpleNamespace(routes=[r]), *at)
+    little, far, land = straight(0.05, "turns"), straight(0.2, "turns"), straight(0.0, "turns", "no_go")
+    assert found(little, 2 * np.pi, 32) is little and found(far, 0.0, 32) is None and found(land, 0.0, 32) is None
+    assert found(far, 0.15, 32) is far and found(little) is None
 
 
 # ---- wrong use

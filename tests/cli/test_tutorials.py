@@ -38,8 +38,15 @@ def force_law(reader):
     assert summary(reader, "python")["mean_wave_drift_force_n"] == pytest.approx(678.7e3, rel=1e-3)
 
 
+def route(reader):
+    found = json.loads((reader.folder / "out/way/route.json").read_text())
+    assert found["verdict"]["members"] == 4 and len(found["routes"]) == 2
+    assert (reader.folder / "out/way/route.html").exists() and (reader.folder / "out/way/routes.gpx").exists()
+
+
 AFTER = {"1-first-tow.md": first_tow, "2-map-to-design-force.md": map_to_design_force,
-         "3-ensemble-on-a-cluster.md": ensemble_on_a_cluster, "4-force-law.md": force_law}
+         "3-ensemble-on-a-cluster.md": ensemble_on_a_cluster, "4-force-law.md": force_law,
+         "5-route.md": route}
 
 
 def test_all_are_followed():

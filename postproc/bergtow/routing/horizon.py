@@ -57,9 +57,15 @@ def with_point(points, way):
     return np.insert(points, k + 1, at, axis=0), k + 1
 
 
-def best(plan):
-    """The cheapest route of a plan that is allowed; None where there is none."""
-    some = [r for r in plan.routes if not r.faults]
+def best(plan, heading=None, headings=32):
+    """The cheapest route of a plan that is allowed; None where there is none. heading: of the tow at a look, rad, which
+    the straight line may leave by half a step of the lattice's headings: none of the lattice is sure to be nearer."""
+    def allowed(r):
+        if set(r.faults) <= {"turns"} and heading is not None:
+            off = (r.heading[0] - heading + np.pi) % (2 * np.pi) - np.pi
+            return not r.faults or abs(off) <= np.pi / headings
+        return not r.faults
+    some = [r for r in plan.routes if allowed(r)]
     return min(some, key=lambda r: r.cost) if some else None
 
 
@@ -158,7 +164,7 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
             break
         ice, start, heading, decided = h.look(k, time, points)
         new = command.planned(a, w, s, goal, weights, factor, ice=ice, start=start, start_heading=heading)
-        route = best(new)
+        route = best(new, heading, a.headings)
         if route:
             ahead = led(route, s, h.speed)
             far = np.hypot(*(ahead - decided[-1]).T) > 0.1 * s.hull.width

@@ -8,7 +8,7 @@ FAULTS = {"missed": "misses the goal", "no_go_contact": "touches an area to keep
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
 PLANNED = {"no_go": "crosses an area to keep out of", "outside": "leaves the domain",
-           "force_limit": "exceeds the force limit by prediction"}
+           "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
 
 def amount(x, unit):
@@ -134,7 +134,8 @@ def rounds(found, markdown=False):
     """The receding horizon."""
     h = found["horizon"]
     head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
-    rows = [[amount(r["time"], "s"), amount(h["age"], "s"), amount(r["length"], "m"), amount(r["work"], "J"),
+    rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),
+             amount(r["length"], "m"), amount(r["work"], "J"),
              r["status"]] for r in found["rounds"]]
     names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
     told = "; ".join(f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}"
