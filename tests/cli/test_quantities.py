@@ -166,8 +166,8 @@ def test_every_number_that_is_listed_is_in_some_summary(tmp_path):
         folder, _ = of_run(tmp_path / name, BERGTOW,
                            changed(case, output__window_start="1 s") if case.get("tow") else case)
         found |= {generic(key, names) for key, _ in numbers(json.loads((folder / "summary.json").read_text()))}
-    split = call("run", write_case(tmp_path / "split", changed(TOW, ice__splitting={"toughness": 100, "least_size": 0.1})),
-                 "--steps", 2, "-o", tmp_path / "split/out")
+    splitting = changed(TOW, ice__splitting={"toughness": 100, "least_size": 0.1})
+    split = call("run", write_case(tmp_path / "split", splitting), "--steps", 2, "-o", tmp_path / "split/out")
     assert split.returncode == DONE, split.stderr
     found |= {key for key, _ in numbers(json.loads((tmp_path / "split/out/summary.json").read_text()))}
     missing = {k["name"] for k in listed()["summary"] if k["number"]} - found
