@@ -139,6 +139,9 @@ SCENES = {
     "crushing_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16,
                               domain__wall_friction=0.4, ice__crushing__pressure="20 kPa"),
     "rafting": changed(DENSE, ice__rafting__kappa=6, ice__concentration=0.85, tow__speed=0.5),
+    "splitting": changed(DENSE, tow__speed=0.5, ice__crushing__pressure="100 kPa", ice__splitting={
+        "toughness": 100, "strength": 200, "least_size": 0.1, "generations": 3, "aspect": 4, "reserve": 500,
+        "scatter": 10}),
     "rafting_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16, ice__rafting__kappa=5,
                              ice__thickness_law="lognormal", ice__crushing__pressure="200 Pa"),
     "impacts_sine": changed(SHORT, tow__speed=0.6, impact__conversion="duration", output__panels=True,
@@ -186,7 +189,8 @@ SCENES = {
         "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
     "output_settings": changed(SHORT, run__title="samples of three steps", report={
-        "client": "a", "project": "b", "author": "c", "revision": "d"}, output={
+        "client": "a", "project": "b", "author": "c", "revision": "d", "document": "D-1", "distribution": "owner"},
+                               output={
         "sample_every": 3, "window_start": 1, "frame_interval": 0.7, "checkpoint_steps": 7, "checkpoint_wall": 1}),
     "estimates": changed(SHORT, tow__speed=0.4, reference={"mean_force": 30, "source": "assumed"}, estimate={
         "p_star": 3e4, "p_s": 1e4, "c_si": 0.8, "kappa": 9, "kappa_low": 4, "kappa_high": 15, "phi_j": 0.85,
