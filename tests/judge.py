@@ -100,7 +100,7 @@ def judge_result(case, folder, whole=True):
                 wrong.append(f"series {name}, {series.attrs['applies']}: {x[~good][:3]}")
         there = np.isfinite(f["frames/pose"][()]).all(axis=2)  # but for floes that have split
         split = [p for p in f["splits/parent"][()] if p < there.shape[1]] if "splits" in f else []
-        if (~there).any(axis=0).nonzero()[0].tolist() != sorted(split) and not (~there[-1:]).sum() <= len(split):
+        if set((~there).any(axis=0).nonzero()[0].tolist()) - set(map(int, split)):
             wrong.append("frames pose: not finite")
         for name in ("pose", "contact_force", "net_force", "body_pose", "speed"):
             x = f["frames"][name][()]
