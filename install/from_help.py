@@ -100,6 +100,7 @@ def man_page(found, own, codes, version):
     out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT",
             *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
                     ("BERGTOW_MPI", "yes or no: start MPI, or not"),
+                    ("BERGTOW_DIVIDE", "always: all ranks share the field, even where one alone would be faster"),
                     ("BERGTOW_HOME", "folder that holds postproc/, where the Python package is"),
                     ("PYTHON", "Python of the commands that the package has; default /usr/bin/python3")])]
     return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"

@@ -9,6 +9,13 @@
 #include "partition/cut.h"
 
 #define TOLERANCE 0.01 // asked of the cut
+/// What a sweep costs two ranks and not one, s: exchanges of four phases, and a sum; the rest of a step is as much as
+/// so many sweeps.
+#define EXCHANGES 40e-6
+#define REST 5
+#define STAYS 1.25 // times what another division must be better by: each change moves the bodies
+/// Bodies that one rank takes at most: some gigabytes.
+enum { MOST_UNDIVIDED = 2000000 };
 
 int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y)
 {
@@ -133,15 +140,30 @@ static int64_t *gather_work(bt_world *w)
     return work;
 }
 
+bool bt_division_is_for_one(const bt_world *w, double work)
+{
+    const bt_domain *d = w->domain;
+    if (d->comm->divides || w->bodies.n_global > MOST_UNDIVIDED) return false;
+    if (d->steps == 0) return !d->distributed; // nothing is known of it before the first step
+    const double saved = work * (1 - 1.0 / d->comm->size);
+    const double lost = EXCHANGES * (REST + (double)d->sweeps / (double)d->steps);
+    return saved * (d->undivided ? 1 / STAYS : STAYS) < lost;
+}
+
 /// The graph of the cells: edges to the eight neighbours, weighted with what a cut there makes the ranks hold twice.
 static void cut_map(bt_world *w)
 {
     const bt_cells *t = w->cells;
     bt_domain *d = w->domain;
     const int n = d->n_x * d->n_y;
-    int64_t *work = gather_work(w);
+    int64_t *work = gather_work(w), all_work = 0;
     double fresh = 0;
-    if (d->comm->rank == 0) {
+    for (int p = 0; p < n; p++) all_work += work[p];
+    d->undivided = bt_division_is_for_one(w, 1e-9 * (double)all_work);
+    if (d->undivided) {
+        memset(d->owner, 0, (size_t)n * sizeof *d->owner);
+        d->stats.cut = 0;
+    } else if (d->comm->rank == 0) {
         int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to),
             *group = bt_alloc((size_t)n, sizeof *group);
         int64_t *edge = bt_alloc(8 * (size_t)n, sizeof *edge);
@@ -186,7 +208,7 @@ static void cut_map(bt_world *w)
     MPI_Bcast(d->owner, n, MPI_INT, 0, d->comm->mpi);
     MPI_Bcast(&d->stats.cut, 1, MPI_DOUBLE, 0, d->comm->mpi);
     MPI_Bcast(&fresh, 1, MPI_DOUBLE, 0, d->comm->mpi);
-    if (d->distributed) { // the first division knew no work yet
+    if (d->distributed && !d->undivided) { // the first division knew no work yet
         d->stats.repartition_imbalance += fresh;
         d->stats.worst_repartition_imbalance = bt_max(d->stats.worst_repartition_imbalance, fresh);
     }
@@ -211,7 +233,7 @@ void bt_division_map(bt_world *w, bool cut)
         cut_map(w);
         memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
         // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at
-        d->steps = 0;
+        d->steps = d->sweeps = 0;
     }
     d->due = false;
     for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++)

@@ -31,6 +31,7 @@ struct bt_domain {
     const bt_comm *comm;
     bool distributed;        ///< bodies are where the map says; before that every rank holds all
     bool due;                ///< a new division is due
+    bool undivided;          ///< rank 0 has all cells
     // the map: owner of every cell of the box
     int *owner;              ///< [n_y][n_x] rank
     uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the cell too
@@ -51,6 +52,7 @@ struct bt_domain {
     // work since the last check
     double *work;            ///< [n_y][n_x] of this rank's cells, s, modelled
     int64_t steps;           ///< since then
+    int64_t sweeps;          ///< in them
     double exchange_s;       ///< wall time in exchanges since asked
     bt_domain_stats stats;
 };
@@ -60,6 +62,9 @@ struct bt_domain {
 
 /// Place of cell (x, y) in the map, −1 outside.
 int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y);
+
+/// Would one rank alone be faster, by the modelled work of a step on all ranks, s?
+bool bt_division_is_for_one(const bt_world *w, double work);
 
 /// Longest path of a large movable body, m; −1 = there is none.
 double bt_division_large_path(const bt_world *w);

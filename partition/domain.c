@@ -126,6 +126,31 @@ uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x)
     return (uint64_t)s.v;
 }
 
+// --- one rank for all ------------------------------------------------------------------------------------------------
+
+bool bt_domain_is_idle(const bt_world *w) { return w->domain && w->domain->undivided && w->domain->comm->rank != 0; }
+
+void bt_domain_solve(bt_world *w, void (*solve)(bt_world *w), bt_vel *shift)
+{
+    bt_domain *d = w->domain;
+    if (!d || !d->undivided) {
+        solve(w);
+    } else {
+        if (d->comm->rank == 0) {
+            const bt_exchange *others = w->exchange;
+            w->domain = NULL, w->exchange = NULL;
+            solve(w);
+            w->domain = d, w->exchange = others;
+        }
+        const double t0 = bt_clock();
+        const bt_step_stats mine = w->stats;
+        MPI_Bcast(&w->stats, sizeof w->stats, MPI_BYTE, 0, d->comm->mpi);
+        w->stats.phases = mine.phases, w->stats.shared = mine.shared, w->stats.in_team = mine.in_team;
+        d->exchange_s += bt_clock() - t0;
+    }
+    bt_domain_settle(w, shift);
+}
+
 // --- balance ---------------------------------------------------------------------------------------------------------
 
 void bt_domain_note(bt_world *w)
@@ -148,21 +173,25 @@ void bt_domain_note(bt_world *w)
                 ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
     const double path = bt_division_large_path(w);
     const bool far = path >= 0 && path - d->large_path + d->drift > 2 * w->par.size;
-    if (++d->steps >= CHECK_STEPS) {
+    d->sweeps += w->stats.sweeps + w->stats.position_sweeps;
+    d->stats.undivided += d->undivided;
+    const bool first = d->undivided && d->stats.undivided == 1;
+    if (++d->steps >= CHECK_STEPS || first) {
         bt_sum total = {0};
         double mine = 0;
         for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++) mine += d->work[p];
         bt_sum_add(&total, mine * 0x1p40);
         bt_comm_reduce(d->comm, &total, 1, &mine, 1, NULL, 0);
         const double mean = bt_sum_value(&total) * 0x1p-40 / d->comm->size, imbalance = mean > 0 ? mine / mean - 1 : 0;
-        if (d->stats.divisions > 1 || imbalance <= IMBALANCE) {
+        const bool for_one = bt_division_is_for_one(w, mean * d->comm->size / (double)d->steps);
+        if (!d->undivided && (d->stats.divisions > 1 || imbalance <= IMBALANCE)) {
             d->stats.checks++;
             d->stats.imbalance += imbalance;
             d->stats.worst_imbalance = bt_max(d->stats.worst_imbalance, imbalance);
         }
-        d->due = imbalance > IMBALANCE;
+        d->due = for_one ? !d->undivided : d->undivided || imbalance > IMBALANCE;
         if (!d->due) {
-            d->steps = 0;
+            d->steps = d->sweeps = 0;
             memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
         }
     }

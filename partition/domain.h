@@ -25,6 +25,7 @@ typedef struct bt_domain_stats {
     double cut;              ///< share of neighbouring cell pairs that lie on different ranks, last division
     double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
     int64_t moved;           ///< bodies that went to another rank
+    int64_t undivided;       ///< steps in which one rank had all cells
 } bt_domain_stats;
 
 /// Collective. Distribute a world that all ranks hold in full, before its first step or between steps. Nothing for one
@@ -34,6 +35,12 @@ void bt_domain_free(bt_domain *d);
 
 /// What the division has cost so far; zeros for one rank.
 bt_domain_stats bt_domain_get_stats(const bt_world *w);
+/// Collective. Have `solve` done: by all ranks, or, where one of them has all cells, by that one as if there were no
+/// others. Then all know the numbers of the step, and velocities of large bodies, the tow line's impulse, and
+/// displacements (an array over the bodies, or NULL).
+void bt_domain_solve(bt_world *w, void (*solve)(bt_world *w), bt_vel *shift);
+/// Another rank has all cells: this one takes no part in a solve.
+bool bt_domain_is_idle(const bt_world *w);
 /// Collective. Account for the work of the step just done.
 void bt_domain_note(bt_world *w);
 /// Wall time spent waiting for other ranks since the last call, s.

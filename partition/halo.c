@@ -150,7 +150,7 @@ static void mark_owned(bt_world *w)
         if (k < t->n - 1) held[own] += cell->end - cell->first;
         // Whoever holds a body of the block waits for what the cell does to it.
         const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
-        cell->border = k == t->n - 1;
+        cell->border = k == t->n - 1 && !d->undivided;
         for (int j = 0; j < 4 && cell->own && k < t->n - 1; j++) {
             if (block[j] < 0) continue;
             const bt_cell *other = &t->cell[block[j]];

@@ -686,7 +686,7 @@ MUTANTS = {
          "floes beside the body keep old velocities"),
         ("for (int32_t dy = -1; dy <= 1; dy++)", "for (int32_t dy = -1; dy <= 0; dy++)", "speeds of cells below"),
         ("sharer) > 1) cell->border = true;", "sharer) > 100) cell->border = true;", "border cells come late"),
-        ("cell->border = k == t->n - 1;", "cell->border = false;", "the last cell's floes are not sent"),
+        ("cell->border = k == t->n - 1 && !d->undivided;", "cell->border = false;", "the last cell's floes are not sent"),
         ("d->touched[cell->contacts[j].b] |= (uint8_t)(1 << cell->phase);", "", "second bodies are not sent"),
         ("if (now) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];",
          "if (now && i) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];", "the first body is not sent"),

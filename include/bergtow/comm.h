@@ -24,6 +24,7 @@ typedef struct bt_comm {
     MPI_Comm mpi;    ///< MPI_COMM_NULL without MPI; never used when size is 1
     int rank, size;
     int ranks_here;  ///< ranks on this node
+    bool divides;    ///< a field is divided among all ranks even where one of them alone would be faster
 } bt_comm;
 
 /// All ranks of the program. Before bt_comm_start, and after bt_comm_end: rank 0 of 1.

@@ -125,6 +125,7 @@ static void count_here(bt_comm *c)
 void bt_comm_split(const bt_comm *c, int group, bt_comm *part)
 {
     *part = bt_comm_alone;
+    part->divides = c->divides;
     if (c->size == 1) return;
     MPI_Comm_split(c->mpi, group, c->rank, &part->mpi); // inherits the error handler
     MPI_Comm_rank(part->mpi, &part->rank);
@@ -164,6 +165,16 @@ static bool wants_mpi(const bt_launcher *by, bool *wanted)
     return true;
 }
 
+/// *divides: as BERGTOW_DIVIDE says.
+static bool wants_division(bool *divides)
+{
+    const char *said = getenv("BERGTOW_DIVIDE");
+    *divides = said && !strcmp(said, "always");
+    if (!said || !*said || *divides) return true;
+    fprintf(stderr, "bergtow: BERGTOW_DIVIDE=%s: give always, or unset it\n", said);
+    return false;
+}
+
 /// The launcher of one MPI starts programs of another as if each were alone, and they would all do the same work.
 static bool knows_all(const bt_launcher *by)
 {
@@ -183,6 +194,7 @@ static bool knows_all(const bt_launcher *by)
 bt_status bt_comm_start(int *argc, char ***argv)
 {
     if (running) return BT_OK;
+    if (!wants_division(&world.divides)) return BT_ERR_USAGE;
     int begun = 0;
     MPI_Initialized(&begun);
     if (!begun) {

@@ -202,7 +202,7 @@ typedef struct bt_run_totals {
     bt_call call;                ///< `end` is that of the summary's own time
     double stepped;              ///< bt_clock after the last step of this call
     // what the division among ranks has cost (domain.h); 0 for one rank
-    int64_t divisions, moved_floes;
+    int64_t divisions, undivided_steps, moved_floes;
     double imbalance, worst_imbalance, repartition_imbalance, worst_repartition_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     /// what a sweep goes through for a contact point of the last step: batches and velocities, B; NaN without contacts

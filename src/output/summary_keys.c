@@ -218,6 +218,7 @@ static const bt_json_key rows[] = {
     MACHINE("ranks", ranks, "1", "MPI ranks"),
     MACHINE("threads", threads, "1", "threads of a rank"),
     MACHINE("divisions", divisions, "1", "times the field was divided anew among the ranks"),
+    MACHINE("undivided_steps", undivided_steps, "1", "steps in which one rank had the whole field, as that is faster"),
     MACHINE("moved_floes", moved_floes, "1", "floes that went to another rank then"),
     MACHINE("imbalance", imbalance, "1",
         "load of the busiest rank over the mean, less 1, mean of the checks after the first division"),

@@ -387,6 +387,7 @@ static void note_division(run *r)
 {
     const bt_domain_stats s = bt_domain_get_stats(r->w);
     r->totals.divisions = s.divisions;
+    r->totals.undivided_steps = s.undivided;
     r->totals.imbalance = s.imbalance;
     r->totals.worst_imbalance = s.worst_imbalance;
     r->totals.repartition_imbalance = s.repartition_imbalance;

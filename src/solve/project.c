@@ -203,27 +203,18 @@ void bt_solver_make_shift(bt_world *w)
     s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
 }
 
-/// Part what overlaps by the gaps as they have been found: bt_solver.shift.
-static void part(bt_world *w)
+static void solve_apart(bt_world *w)
 {
-    const bt_cells *ts = w->cells;
-    bt_solver *s = w->solver;
     bt_step_stats *st = &w->stats;
-    bt_solver_make_shift(w);
-    for (bt_idx j = 0; j < ts->n_busy; j++) {
-        const bt_idx k = ts->busy[j];
-        if (k == ts->n - 1 || bt_cells_moves(ts, k))
-            memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
-    }
     bt_problem p = {.residual = residual_of_cell,
                     .sweep = project_cell,
-                    .vel = s->shift,
+                    .vel = w->solver->shift,
                     .tolerance = 0.1 * w->par.slop,
                     .cap = 0.9,
                     .length = 25,
                     .limit = (double)w->par.position_sweeps,
                     .plain = w->par.plain_sweeps};
-    bt_rounds_scale(&p, ts);
+    bt_rounds_scale(&p, w->cells);
     bt_work work = {0};
     bt_rounds_residual(w, &p, BT_BEGINS, &work);
     if (p.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
@@ -233,7 +224,20 @@ static void part(bt_world *w)
     st->position_sweeps += work.sweeps;
     st->position_updates += work.updates;
     st->projected = st->projected && work.residual <= p.tolerance;
-    bt_domain_settle(w, s->shift);
+}
+
+/// Part what overlaps by the gaps as they have been found: bt_solver.shift.
+static void part(bt_world *w)
+{
+    const bt_cells *ts = w->cells;
+    bt_solver *s = w->solver;
+    bt_solver_make_shift(w);
+    for (bt_idx j = 0; j < ts->n_busy; j++) {
+        const bt_idx k = ts->busy[j];
+        if (k == ts->n - 1 || bt_cells_moves(ts, k))
+            memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
+    }
+    bt_domain_solve(w, solve_apart, s->shift);
 }
 
 void bt_solver_project(bt_world *w)

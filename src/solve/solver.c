@@ -348,7 +348,19 @@ static void sweep_to_tolerance(bt_world *w)
     st->residual = work.residual;
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
     st->converged = work.residual <= p.tolerance;
-    bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
+}
+
+static void solve(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    s->rebounds = bt_restitution_begin(w);
+    for (;;) {
+        sweep_to_tolerance(w);
+        if (!s->rebounds) break;
+        bt_domain_settle(w, NULL);
+        if (!bt_restitution_lower(w)) break;
+        w->stats.restitution_cut = true;
+    }
 }
 
 void bt_solver_solve(bt_world *w)
@@ -359,11 +371,6 @@ void bt_solver_solve(bt_world *w)
     // the displacements of the last step are over, and their array is of the bodies that were here then
     s->shifted = false;
     st->sweeps = st->contact_updates = st->contact_moves = st->residual_checks = 0;
-    s->rebounds = bt_restitution_begin(w);
-    for (;;) {
-        sweep_to_tolerance(w);
-        if (!s->rebounds) break;
-        if (!bt_restitution_lower(w)) break;
-        st->restitution_cut = true;
-    }
+    if (bt_domain_is_idle(w)) settle(w);
+    bt_domain_solve(w, solve, NULL);
 }

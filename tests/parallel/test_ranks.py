@@ -9,7 +9,7 @@ contact knew of the last step left behind when it goes to another rank. Each was
 import numpy as np
 import pytest
 
-from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, quick, run, write_case
+from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, environment, quick, run, write_case
 from test_ranks_output import mpirun
 
 # A heavy berg on a line: one rank does its contacts, and the cells under it go with it. Tiles are small, so that there
@@ -102,7 +102,7 @@ LAYOUTS = quick([(n, *p) for n, pairs in PAIRS.items() for p in pairs], ("line",
                 ("jam", 2, 1), ("round", 3, 2), ("tide", 2, 2), ("crush", 3, 1), ("ring", 4, 1))
 
 
-def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
+def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW, env=None):
     name = name or f"out{ranks}x{threads}"
     result = mpirun(ranks,
                     "run",
@@ -115,6 +115,7 @@ def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
                     *arguments,
                     program=(program, ),
                     cwd=folder,
+                    env=env,
                     timeout=300)
     assert result.returncode == DONE, result.stderr
     r = Run(folder / name, result)
@@ -179,6 +180,33 @@ def test_the_same_bits(alone, name, ranks, threads):
     assert 0 < r.summary["edge_cut"] <= 1 and 0 < r.summary["halo_share"] < 3
     assert 0 <= r.summary["imbalance"] <= r.summary["worst_imbalance"]
     assert 0 <= r.summary["repartition_imbalance"] <= r.summary["worst_repartition_imbalance"]
+
+
+@pytest.mark.parametrize("name, ranks", quick([(n, r) for n in CASES for r in (2, 3)], ("line", 2), ("round", 3),
+                                              ("crush", 2)))
+def test_one_rank_may_do_it_all(alone, name, ranks):
+    """Small fields are not divided: rank 0 solves them as if alone. Red where the others miss what it found, or it
+    waits for them."""
+    folder, one = alone(name)
+    env = environment(OMP_NUM_THREADS=1, BERGTOW_DIVIDE="")
+    r = many(folder, ranks, 1, name=f"undivided{ranks}", env=env)
+    assert_same(one, r)
+    assert r.summary["undivided_steps"] > 0
+
+
+def test_a_field_is_divided_while_that_pays(tmp_path):
+    """Walls close on 9,000 floes: at first next to none touch, and one rank has all; then sharing pays."""
+    case = changed(PRESS, domain__length=200, domain__width=40, ice__concentration=0.8, run__duration=6,
+                   solver__max_sweeps=None, domain__ends_closing=2, domain__sides_closing=0)
+    one = run(tmp_path, case, "--threads", 1, "--quiet")
+    r = many(tmp_path, 2, 1, name="two", env=environment(OMP_NUM_THREADS=1, BERGTOW_DIVIDE=""))
+    assert_same(one, r)
+    assert 0 < r.summary["undivided_steps"] < r.summary["n_steps"] and r.summary["halo_share"] > 0
+
+
+def test_a_wrong_division_is_refused(tmp_path):
+    result = mpirun(2, "run", "case.yml", cwd=tmp_path, env=environment(BERGTOW_DIVIDE="never"))
+    assert result.returncode == 2 and "BERGTOW_DIVIDE=never: give always, or unset it" in result.stderr
 
 
 def test_floes_at_a_free_body_that_other_ranks_hold(tmp_path):

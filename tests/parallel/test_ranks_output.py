@@ -35,9 +35,9 @@ def command(ranks, *arguments):
     return [*launcher(ranks), *map(str, arguments)]
 
 
-def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, **more):
+def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, env=None, **more):
     done = subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
-                          env=environment(OMP_NUM_THREADS=1),
+                          env=env or environment(OMP_NUM_THREADS=1),
                           capture_output=True,
                           text=True,
                           timeout=timeout,
