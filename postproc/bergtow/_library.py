@@ -145,7 +145,7 @@ _SIGNATURES = {
 
 def _candidates() -> list[str]:
     """Where the library may be: BERGTOW_LIB alone, if that is set; else the source tree or the prefix that this package
-    lies in, then wherever the linker looks."""
+    lies in, then wherever the linker looks, which may have one with MPI, then what the wheel has brought."""
     named = os.environ.get("BERGTOW_LIB")
     if named:
         path = Path(named)
@@ -154,7 +154,8 @@ def _candidates() -> list[str]:
     found = [here.parents[1] / "build/release" / SONAME]
     if len(here.parents) > 3:
         found.append(here.parents[3] / "lib" / SONAME)
-    return [str(p) for p in found if p.exists()] + [SONAME, ctypes.util.find_library("bergtow") or SONAME]
+    return [str(p) for p in found if p.exists()] + [SONAME, ctypes.util.find_library("bergtow") or SONAME,
+                                                    str(here / "_lib" / SONAME)]
 
 
 def library_path() -> str:
@@ -228,23 +229,21 @@ def load() -> tuple[Library, str]:
         os.environ.setdefault("GOMP_SPINCOUNT", "20000")
     # UCX, which the Open MPI of Debian 13 loads, takes SIGHUP for its debugger, also from nohup.
     os.environ.setdefault("UCX_DEBUG_SIGNO", "0")
+    from . import __version__
     reasons = []
     for path in dict.fromkeys(_candidates()):
         try:
             lib = ctypes.CDLL(path, mode=ctypes.RTLD_GLOBAL)  # MPI opens modules that need its symbols
-            break
         except OSError as error:
             reasons.append(str(error))
-    else:
-        raise BergtowError("libbergtow cannot be loaded (" + "; ".join(reasons) + "); build it with `make lib`, "
-                           "install it with `make install`, or name its file in BERGTOW_LIB", IO)
-    library = Library(lib)
-    from . import __version__
-    version = library.bt_version().decode()
-    if version != __version__:
-        raise BergtowError(f"{path}: is libbergtow {version}, and this package is for {__version__}; "
-                           "install both from the same source", IO)
-    return library, path
+            continue
+        lib.bt_version.restype = c_char_p
+        version = lib.bt_version().decode()
+        if version == __version__:
+            return Library(lib), path
+        reasons.append(f"{path} is libbergtow {version}, and this package is for {__version__}")
+    raise BergtowError("libbergtow cannot be loaded (" + "; ".join(reasons) + "); build it with `make lib`, "
+                       "install it with `make install` from the same source, or name its file in BERGTOW_LIB", IO)
 
 
 def library() -> Library:

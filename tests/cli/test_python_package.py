@@ -390,6 +390,24 @@ def test_the_package_in_a_python_without_numpy():
     assert "ImportError: bergtow needs numpy" in said and sys.executable in said and "python3-numpy" in said
 
 
+def test_the_library_of_the_wheel_is_found_and_one_of_another_version_passed_over(tmp_path):
+    """A tree like that of an installed wheel; before its own library comes one of another version."""
+    package = tmp_path / "postproc/bergtow"
+    shutil.copytree(ROOT / "postproc/bergtow", package, ignore=shutil.ignore_patterns("__pycache__"))
+    other = tmp_path / "build/release/libbergtow.so.0"
+    other.parent.mkdir(parents=True)
+    subprocess.run(["gcc", "-shared", "-x", "c", "-", "-o", other], check=True, text=True,
+                   input='const char *bt_version(void) { return "9.9.9"; }')
+    env = {"BERGTOW_LIB": "", "LD_LIBRARY_PATH": ""}
+    code = "from bergtow import _library; print(_library.library_path())"
+    said = python(code, path=package.parent, **env)
+    assert said.returncode == 1 and "is libbergtow 9.9.9, and this package is for" in said.stderr, said.stderr
+    (package / "_lib").mkdir()
+    (package / "_lib/libbergtow.so.0").symlink_to(LIBRARY)
+    said = python(code, path=package.parent, **env)
+    assert said.stdout.strip() == str(package / "_lib/libbergtow.so.0"), said.stderr
+
+
 def test_everything_public_has_types_and_a_text():
     for name in bergtow.__all__:
         thing = getattr(bergtow, name)
