@@ -20,7 +20,7 @@
 // finished and sound.
 //
 // Who does what. Whoever works on a member holds a lock on members/NAME/lock, which the system releases when the
-// process ends, however it ends, and the lock of its result folder (src/base/lock.h): a member that a `bergtow
+// process ends, however it ends, and the lock of its result folder (src/base/fileio.h): a member that a `bergtow
 // resume` is at stays open, and is waited for as for one of another call. So groups of ranks, jobs of an array on a
 // cluster, and a call that resumes a killed one need no word between them: each takes the next member that is
 // neither finished, failed nor locked, the longest first by an estimate, with a limit of wall time field by field,

@@ -17,7 +17,6 @@
 
 #include "base/largest.h"
 #include "base/name.h"
-#include "base/suggest.h"
 #include "case/body_shapes.h"
 #include "case/value.h"
 

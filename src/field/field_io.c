@@ -26,7 +26,7 @@
 #include "field/field_admit.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "case/ice_bounds.h"
 
 static const char *const region_names[4] = {"x_min", "y_min", "x_max", "y_max"};

@@ -8,7 +8,7 @@
 
 typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text
-    const char *axes;                   ///< h5axes.h
+    const char *axes;                   ///< h5dataset.h
 } row;
 
 static const row rows[] = {

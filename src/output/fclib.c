@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 
 #define COMPRESSED_ROWS (-2)
 

@@ -5,7 +5,7 @@
 
 #include "output/map_axes.h"
 #include "output/record.h"
-#include "base/h5slab.h"
+#include "base/h5dataset.h"
 
 typedef struct bt_frames {
     bt_h5 *h;

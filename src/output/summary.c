@@ -15,7 +15,7 @@
 #include "estimate/packing.h"
 #include "geometry/path.h"
 #include "output/summary_window.h"
-#include "base/ascending.h"
+#include "base/inside.h"
 #include "base/elementary.h"
 #include "solve/locked.h"
 #include "step/splitting.h"

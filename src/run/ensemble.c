@@ -23,8 +23,7 @@
 #include "run/halt.h"
 #include "run/study_axes.h"
 #include "base/fileio.h"
-#include "base/launcher.h"
-#include "base/lock.h"
+#include "base/process.h"
 
 // Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
 #define GATHER_SECONDS 1.0

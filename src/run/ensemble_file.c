@@ -38,7 +38,7 @@
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "case/schema.h"
 #include "base/checksum.h"
 #include "bergtow/quantity.h"

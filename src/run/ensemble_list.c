@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/lock.h"
+#include "base/fileio.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
 #include "field/field_kept.h"

@@ -36,7 +36,7 @@ typedef struct bt_ensemble {
     char *fields;       ///< folder of the fields that members share
     int64_t fixed;      ///< conditions whose ice does not depend on the seed
     int n_groups, of_group, threads, jobs;
-    int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/lock.h)
+    int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/fileio.h)
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded

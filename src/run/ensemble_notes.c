@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/fileio.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "case/warning.h"
 
 static char *copied(const json_t *value)

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/fileio.h"
-#include "base/lock.h"
 #include "case/case_files.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"

@@ -8,7 +8,7 @@
 
 #include "output/checkpoint.h"
 #include "output/folder.h"
-#include "base/lock.h"
+#include "base/fileio.h"
 #include "run/run_parts.h"
 
 /// Collective. *failed: the step that was not sound, −1 = none.

@@ -29,11 +29,10 @@
 #include "case/cost.h"
 #include "field/field_kept.h"
 #include "partition/domain.h"
-#include "base/cores.h"
+#include "base/process.h"
 #include "base/fileio.h"
 #include "output/folder.h"
 #include "output/gather.h"
-#include "base/lock.h"
 #include "run/run_parts.h"
 
 typedef bt_running run;

@@ -13,7 +13,6 @@
 #include "base/fileio.h"
 #include "base/json.h"
 #include "base/largest.h"
-#include "base/lock.h"
 #include "base/units.h"
 #include "case/arch.h"
 #include "case/case_base.h"

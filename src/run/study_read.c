@@ -9,7 +9,7 @@
 
 #include "base/fileio.h"
 #include "base/largest.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
 #include "case/value.h"

@@ -11,7 +11,7 @@
 #include "base/inside.h"
 #include "base/largest.h"
 #include "base/rng.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "case/schema.h"
 #include "case/value.h"
 #include "run/study_values.h"
