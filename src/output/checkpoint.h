@@ -56,7 +56,7 @@
 //                     - contact, closed, collision, largest_quasi_static_load, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way
 //                     in result.h5: the entries and frames themselves
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
+//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel.h)
 //                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
 //                     D the rest

@@ -113,7 +113,7 @@ static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double valu
 /// has: bit 1 << k for each bt_applies k of the run.
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
 
-/// The contact forces of a step in which the load of the towed body has no bound (solve/locked.h) become NaN. The tow
+/// The contact forces of a step in which the load of the towed body has no bound (solve/islands.h) become NaN. The tow
 /// force is one of them at a prescribed speed, and stays a number on a line.
 void bt_sample_lose_load(bt_sample *s, bool prescribed);
 

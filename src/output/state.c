@@ -11,7 +11,7 @@
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
-#include "force/added.h"
+#include "force/forces.h"
 #include "force/laws.h"
 #include "loads/impact.h"
 #include "space/cells.h"

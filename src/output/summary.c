@@ -17,7 +17,7 @@
 #include "output/summary_window.h"
 #include "base/inside.h"
 #include "base/elementary.h"
-#include "solve/locked.h"
+#include "solve/islands.h"
 #include "step/splitting.h"
 
 #include <math.h>

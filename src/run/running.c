@@ -20,7 +20,7 @@
 #include "output/dump.h"
 #include "output/observe.h"
 #include "solve/batch.h"
-#include "solve/locked.h"
+#include "solve/islands.h"
 #include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
