@@ -97,7 +97,7 @@ MUTANTS = {
          "floes outside the region count after a lead"),
         ("of.ice.x_min = r[0], of.ice.y_min", "of.ice.y_min", "a field's region is the domain"),
     ]),
-    "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused",
+    "src/field/field_make.c": ([EDGES + "what_leaves_no_sizes_is_refused",
                            EDGES + "floes_below_the_least_size_are_counted"], [
         ("s.below += d < limit;", "s.below += d < 0.5 * limit;", "floes below the least size"),
     ]),
@@ -615,7 +615,7 @@ MUTANTS = {
     ]),
     "src/output/summary.c": (["unit/test_summary", EDGES + "estimates_are_those_of_the_leg_in_the_window",
                              EDGES + "the_ordered_speed_is_that_of_the_window",
-                             MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"], [
+                             MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"] + ["unit/test_summary"], [
         ("if (isfinite(yaw) && !s->turns) straight", "if (false) straight",
          "the width at the start, not in the window"),
         ("in->ordered = speed - (along - ice[0]);", "in->ordered += ice[0] - water[0];", "the current of the run"),
@@ -626,6 +626,9 @@ MUTANTS = {
         ("    if (adrift) {", "    if (false) {", "estimates of a body that nothing tows"),
         ("in->along = ice[0], in->speed", "in->speed", "the speed ordered"),
         ("return s->window.met_no_ice ? NAN : s->ice.mean;", "return s->ice.mean;", "0 held against an estimate"),
+        ("floes = (double)(v->renewed + v->kept);", "floes = (double)(v->renewed + v->missed);",
+         "floes that come back, of the places ahead"),
+        ("(double)v->kept > SHARE_LIMIT * floes", "(double)v->kept > floes", "disturbed ice that comes back"),
     ]),
     "src/loads/impact.c": (["physics/test_impacts", "physics/test_impact_loads", "cli/test_impacts.py",
                             "scenes:impacts_crushing,impact_duration"], [
@@ -722,11 +725,6 @@ MUTANTS = {
         ("if (!isnan(x) && !(x <= most)) most = x;", "if (!isnan(x)) most = x;",
          "the last branch, not the strongest"),
     ]),
-    "src/output/summary_window.c": (["unit/test_summary"], [
-        ("floes = (double)(v->renewed + v->kept);", "floes = (double)(v->renewed + v->missed);",
-         "floes that come back, of the places ahead"),
-        ("(double)v->kept > SHARE_LIMIT * floes", "(double)v->kept > floes", "disturbed ice that comes back"),
-    ]),
     "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting"], [
         ("TOTAL(F64, max_overlap, MAX, overlap,", "TOTAL(F64, max_overlap, LAST, overlap,", "largest overlap"),
         ("TOTAL(F64, contact_work, SUM, contact_work,", "TOTAL(F64, contact_work, LAST, contact_work,",
@@ -741,7 +739,7 @@ MUTANTS = {
         ("r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS", "true", "a negative number of steps in a row"),
         ("isfinite(r->totals.wall_time)", "true", "a wall time that is no number"),
     ]),
-    "src/run/study_axes.c": (["cli/test_bad_study.py"], [
+    "src/run/study.c": (["cli/test_bad_study.py"], [
         ("*y = sorted[first];", "*y = sorted[i - 1];", "a parameter's own key under a second of its values"),
         ("if (x->axis == y->axis && s->parameter[y->axis].name != y->text) continue;", "",
          "each value of a parameter has keys of its own"),
@@ -824,15 +822,13 @@ MUTANTS = {
         ("status == BT_OK && last) status = bt_checkpoint_write",
          "status == BT_OK && last && 0) status = bt_checkpoint_write", "no last checkpoint"),
     ]),
-    "src/output/record_resume.c": (FILES + ENDS + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
+    "src/output/record_resume.c": (FILES + ENDS + ["cli/test_faults.py::test_nothing_is_lost[run]"] + ["cli/test_other_runs.py"], [
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, r->h5.status);",
          "    bt_status status = bt_comm_agree(r->comm, r->h5.status);", "frames of other ranks at a checkpoint"),
         ("        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);\n", "",
          "no checksum"),
         ("        bt_record_flush(r);\n        status = r->h5.status;", "        status = r->h5.status;",
          "not flushed"),
-    ]),
-    "src/output/record_run.c": (["cli/test_other_runs.py"], [
         ("if (strcmp(its ? its : \"\", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)", "if (0)",
          "what two runs began with is not compared"),
         ("if (entry == x[i] ||", "if (1 ||", "series are not compared with the history"),
@@ -853,7 +849,7 @@ MUTANTS = {
         ("sound ? before : damaged", "before", "a damaged checkpoint replaces a sound one"),
         ("if (status != BT_OK) unlink(part);", "", "a part stays under the temporary name"),
     ]),
-    "src/output/fclib.c": (SYNC + ["unit/test_fclib"], [
+    "src/output/dump.c": (SYNC + ["unit/test_fclib"], [
         ("if (status == BT_OK) status = bt_file_rename(temporary, path, err);", "rename(temporary, path);",
          "not synced"),
     ]),
@@ -875,7 +871,7 @@ MUTANTS = {
         ("if (errnum && h->status == BT_OK)", "if (0)", "series that cannot be read are empty rows"),
         ("t->unread += status == BT_ERR_IO;", "", "a member that cannot be read is left out without a word"),
     ]),
-    "src/run/ensemble_journal.c": (SYNC + ["cli/test_ensemble.py"], [
+    "src/run/ensemble_list.c": (SYNC + ["cli/test_ensemble.py"], [
         ("if (write(fd, line, (size_t)n) == n) fsync(fd);",
          "if (write(fd, line, (size_t)n) != n) (void)0;", "the journal is not synced"),
     ]),

@@ -2,7 +2,7 @@
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
 // Folder. DIR/study.resolved.yml says what the members are, DIR/study.files what is in the files that they name
-// (src/run/study_files.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
+// (src/run/study.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
 // file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed
 // when it holds failed.txt (first line: exit code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where
 // that takes no file), and else waits. DIR/journal.jsonl has a line for each start and end, with wall times (null where

@@ -3,10 +3,8 @@
 #include "contact/added.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "base/name.h"
 #include "contact/row.h"
 #include "contact/law_pair.h"
 
@@ -126,65 +124,4 @@ void bt_added_stats(bt_step_stats *st, const bt_totals *t)
     for (int k = 0; k < n_added; k++)
         for (int i = 0; i <= BT_MAX_CONTACT_NUMBERS; i++)
             st->added[k][i] = bt_sum_value(&t->sum[first_sum(BT_LAWS + k) + i]);
-}
-
-// --- what a law must have --------------------------------------------------------------------------------------------
-
-static bool is_known(const char *name)
-{
-    for (int law = 0; law < BT_LAWS; law++)
-        if (!strcmp(bt_laws[law]->name, name)) return true;
-    for (int k = 0; k < bt_n_contact_laws(); k++)
-        if (!strcmp(bt_contact_law_of(k)->name, name)) return true;
-    return false;
-}
-
-static void check_numbers(const bt_contact_law *law, const char *name, bt_errors *err)
-{
-    if (law->n_numbers < 0 || law->n_numbers > BT_MAX_CONTACT_NUMBERS)
-        bt_errors_add(err, "contact law %s: it has %d numbers, at most %d fit", name, law->n_numbers,
-                      BT_MAX_CONTACT_NUMBERS);
-    else
-        for (int k = 0; k < law->n_numbers; k++)
-            if (law->numbers[k].state ? !law->count : !law->remember)
-                bt_errors_add(err, "contact law %s: nothing adds to its number %s; give it `%s`", name,
-                              law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
-}
-
-/// The series that it brings: its work and its numbers.
-static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
-{
-    char work[BT_MOST_LAW_NAME + sizeof "_work"];
-    snprintf(work, sizeof work, "%.*s_work", BT_MOST_LAW_NAME, name);
-    if (!bt_series_may_be || !bt_series_may_be(work, 1 + law->n_numbers, err)) return;
-    for (int k = 0; k < law->n_numbers; k++) {
-        const bt_contact_number *n = &law->numbers[k];
-        if (!n->name || !n->units || !*n->units || !n->description || strlen(n->description) < 8)
-            bt_errors_add(err, "contact law %s: its number %d needs name, units (\"1\" for a plain number) and a "
-                          "description", name, k + 1);
-        else bt_series_may_be(n->name, 1, err);
-    }
-}
-
-bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
-{
-    const size_t before = err->n;
-    const char *name = law->name ? law->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "contact law \"%s\": the name must be of lower-case letters, digits and _, at most 40",
-                      name);
-    else if (is_known(name))
-        bt_errors_add(err, "contact law %s: there is a law of this name; choose another", name);
-    if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
-    if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "contact law %s: say in a line what it is (`doc`)", name);
-    if (law->n_keys < 0 || law->n_keys > BT_MAX_CONTACT_OWN)
-        bt_errors_add(err, "contact law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_CONTACT_OWN);
-    check_numbers(law, name, err);
-    if (bt_n_contact_laws() == BT_MAX_ADDED_LAWS)
-        bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name,
-                      BT_MAX_ADDED_LAWS);
-    if (err->n == before) check_series(law, name, err);
-    if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
-    bt_added_add(law); // there is room
-    return BT_OK;
 }

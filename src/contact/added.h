@@ -4,13 +4,13 @@
 //
 // They have no rows in bt_laws: a row's functions know the law by themselves, and one set of functions here serves all
 // that are added. Their bounds are flat and known before the sweeps, so that batches of four take them.
-#ifndef BT_ADDED_H
-#define BT_ADDED_H
+#ifndef BERGTOW_CONTACT_ADDED_H
+#define BERGTOW_CONTACT_ADDED_H
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
 
-/// A law that has been checked (added.c), after those that are there. False: there is no room.
+/// A law that has been checked (register.c), after those that are there. False: there is no room.
 bool bt_added_add(const bt_contact_law *law);
 
 /// False of a law that the world is without.

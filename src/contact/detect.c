@@ -28,11 +28,6 @@
 // different sides, as in a notch, and stay. Of two points at one place the deeper one stays: the other may be the end
 // of an edge that is cut off at the seam, and above the corner that lies just beyond it.
 
-/// Of the manifolds man [n], in the order of gids and parts, those of bodies that are not convex and of shores: points
-/// that another part of the same pair of bodies, or another piece of a shore with the same body, has as well are taken
-/// out. What has no point left has n_points = 0.
-void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n);
-
 #define SQUARE 0.98 // cosine, as for reference edges
 #define PLACE 0.01  // of the smaller radius, as for reference edges
 
@@ -83,7 +78,7 @@ static void settle(const bt_world *w, const touch *p, const touch *q)
 }
 
 /// The contacts t[n] of one body with the polygons of one outline.
-static void merge(const bt_world *w, const touch *t, size_t n)
+static void unite(const bt_world *w, const touch *t, size_t n)
 {
     // Edges that lie on each other know more than single points: those go first, whatever their order.
     for (size_t i = 0; i < n; i++)
@@ -121,7 +116,7 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
     if (on_shore > 0) qsort(t, on_shore, sizeof *t, by_body);
     for (size_t k = 0, end; k < on_shore; k = end) {
         for (end = k + 1; end < on_shore && t[end].body == t[k].body; end++) {}
-        if (end > k + 1) merge(w, t + k, end - k);
+        if (end > k + 1) unite(w, t + k, end - k);
     }
     free(t);
 }

@@ -35,7 +35,6 @@
 #include "base/largest.h"
 #include "field/map_crs.h"
 #include "field/map_features.h"
-#include "field/map_place.h"
 #include "base/name.h"
 
 static const double DEGREE = BT_PI / 180;

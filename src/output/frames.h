@@ -3,7 +3,7 @@
 #ifndef BT_FRAMES_H
 #define BT_FRAMES_H
 
-#include "output/map_axes.h"
+#include "output/xdmf.h"
 #include "output/record.h"
 #include "base/h5dataset.h"
 

@@ -226,7 +226,7 @@ bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, co
 bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
                            const bt_record_bodies *b, const char *command_line, bt_errors *err);
 
-/// After either: the identity of the run (record_run.c) goes to the file, and to the checkpoints of this record.
+/// After either: the identity of the run (record_resume.c) goes to the file, and to the checkpoints of this record.
 /// identity: on rank 0. The status is that of rank 0: agree on it.
 bt_status bt_record_identify(bt_record *r, const char *identity, bt_errors *err);
 

@@ -21,7 +21,7 @@ struct bt_record {
     char *dir;
     const bt_case *c;
     const bt_comm *comm;
-    char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_run.c)
+    char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_resume.c)
     bool fresh;            ///< a new run, in place of what the folder held
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;

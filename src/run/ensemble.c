@@ -16,12 +16,10 @@
 #include "output/checkpoint.h"
 #include "field/field_kept.h"
 #include "bergtow/run.h"
-#include "run/ensemble_folder.h"
-#include "run/ensemble_journal.h"
 #include "run/ensemble_list.h"
 #include "run/ensemble_member.h"
 #include "run/halt.h"
-#include "run/study_axes.h"
+#include "run/study.h"
 #include "base/fileio.h"
 #include "base/process.h"
 

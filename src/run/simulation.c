@@ -16,7 +16,7 @@
 #include "base/units.h"
 #include "case/arch.h"
 #include "case/case_base.h"
-#include "field/map_place.h"
+#include "field/map_crs.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
 #include "output/folder.h"

@@ -14,7 +14,7 @@
 #include "base/name.h"
 #include "case/schema.h"
 #include "case/value.h"
-#include "run/study_values.h"
+#include "run/study.h"
 
 void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...)
 {
