@@ -214,7 +214,7 @@ MUTANTS = {
                             "cli/test_locked.py::test_a_lock_below_the_tolerance_is_none_beside_a_jam_either",
                             "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
         ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
-        ("s->root[bt_islands_root(s, u->b)] = bt_islands_root(s, u->a);", "", "every floe an island"),
+        ("s->root[islands_root(s, u->b)] = islands_root(s, u->a);", "", "every floe an island"),
         ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
         ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
@@ -318,7 +318,7 @@ MUTANTS = {
         ("mine.me = omp_get_thread_num();", "mine.me = 0;", "every thread is the first"),
         ("if (o->team == 1) return;", "if (o->team <= 2) return;", "two threads do not wait"),
         ("into->most2 = bt_max(into->most2, from->most2);", "", "a second maximum of one thread"),
-        ("#pragma omp critical\n        bt_totals_merge(t, &own);", "", "totals of a thread are lost"),
+        ("#pragma omp critical\n        totals_merge(t, &own);", "", "totals of a thread are lost"),
         (".most = t->most, .most2 = t->most2};", "};", "maxima of busy cells begin at 0"),
     ]),
     "src/contact/pack.c": (["unit/test_contacts", "physics/test_contact_law",

@@ -32,17 +32,10 @@ typedef struct bt_jobs {
     char threads[16];
 } bt_jobs;
 
-/// Is this process one of them? Then it also ends, with checkpoints, when the one that started it has ended.
-bool bt_jobs_is_one(void);
-
-/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started, or is killed, is reported and
-/// done without.
-void bt_jobs_start(void *of, int n, int threads);
-void bt_jobs_end(void *of, bool stop);
-
 static const char mark[] = "BERGTOW_JOB";
 
-bool bt_jobs_is_one(void)
+/// Is this process one of them? Then it also ends, with checkpoints, when the one that started it has ended.
+static bool jobs_is_one(void)
 {
     const char *parent = getenv(mark);
     if (!parent) return false;
@@ -51,7 +44,9 @@ bool bt_jobs_is_one(void)
     return true;
 }
 
-void bt_jobs_start(void *of, int n, int threads)
+/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started, or is killed, is reported and
+/// done without.
+static void jobs_start(void *of, int n, int threads)
 {
     bt_jobs *j = of;
     char **words = bt_alloc((size_t)j->argc + 5, sizeof *words);
@@ -87,7 +82,7 @@ void bt_jobs_start(void *of, int n, int threads)
     free(words);
 }
 
-void bt_jobs_end(void *of, bool stop)
+static void jobs_end(void *of, bool stop)
 {
     bt_jobs *j = of;
     for (int i = 0; i < j->n && stop; i++)
@@ -177,8 +172,8 @@ int bt_cmd_ensemble(int argc, char **argv)
     char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
     if (folder) o.run.dir = folder;
     bt_jobs jobs = {.argc = argc, .argv = argv};
-    o.run.helpers = &(bt_ensemble_helpers){.start = bt_jobs_start, .end = bt_jobs_end, .of = &jobs};
-    o.run.job = bt_jobs_is_one();
+    o.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
+    o.run.job = jobs_is_one();
     if (o.run.job) o.run.retry = false; // the call that started it has forgotten the failures, and records new ones
     bt_study s = {0};
     bt_errors err = {0};

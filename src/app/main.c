@@ -1,98 +1,22 @@
 // SPDX-License-Identifier: MIT
 // The program bergtow: options that need no command, and the way to the commands.
+#include "bergtow/comm.h"
+#include "app/cmd.h"
+#include "app/processor.h"
+#include "revision.h"
+#include "base/process.h"
+#include "base/name.h"
+#include "case/case_base.h"
+#include "output/quantity_list.h"
+
 #include <omp.h>
 #include <sched.h>
 #include <signal.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <unistd.h>
-
-#include "bergtow/base.h"
-#include "bergtow/comm.h"
-#include "app/cmd.h"
-#include "base/name.h"
-#include "base/process.h"
-#include "case/case_base.h"
-#include "output/quantity_list.h"
-#include "revision.h"
-
-// --- a processor for each thread -------------------------------------------------------------------------------------
-
-// Has this processor what the program was compiled for?
-//
-// As the Makefile builds it, the program runs on any x86-64 or ARM, and takes AVX2 where it is. With
-// EXTRA_CFLAGS=-march=native, or as a packager has set it, an older processor of the same cluster would end it at the
-// first instruction that it does not know, with SIGILL and no word.
-
-/// Ends the program with a message and code 2 if not. May be called before the constructors of libraries.
-void bt_processor_check(void);
-
-#ifdef __x86_64__
-#define NEEDS(feature) \
-    if (!__builtin_cpu_supports(feature)) return feature
-
-/// The first of the extensions that the compiler was allowed that is not here, or NULL.
-static const char *missing(void)
-{
-    __builtin_cpu_init();
-#ifdef __SSE4_1__
-    NEEDS("sse4.1");
-#endif
-#ifdef __SSE4_2__
-    NEEDS("sse4.2");
-#endif
-#ifdef __POPCNT__
-    NEEDS("popcnt");
-#endif
-#ifdef __AVX__
-    NEEDS("avx");
-#endif
-#ifdef __AVX2__
-    NEEDS("avx2");
-#endif
-#ifdef __BMI2__
-    NEEDS("bmi2");
-#endif
-#ifdef __FMA__
-    NEEDS("fma");
-#endif
-#ifdef __AVX512F__
-    NEEDS("avx512f");
-#endif
-#ifdef __AVX512VL__
-    NEEDS("avx512vl");
-#endif
-#ifdef __AVX512BW__
-    NEEDS("avx512bw");
-#endif
-#ifdef __AVX512DQ__
-    NEEDS("avx512dq");
-#endif
-    return NULL;
-}
-#else
-static const char *missing(void) { return NULL; }
-#endif
-
-static void say(const char *text)
-{
-    if (write(STDERR_FILENO, text, strlen(text)) < 0) return; // stderr is closed
-}
-
-void bt_processor_check(void)
-{
-    const char *what = missing();
-    if (!what) return;
-    say("bergtow: built for processors with ");
-    say(what);
-    say(", which this one lacks; build it on this machine, or without -march (make clean all)\n");
-    _exit(BT_ERR_USAGE);
-}
-
-// --- the program -----------------------------------------------------------------------------------------------------
 
 static const struct {
     const char *name, *summary;

@@ -102,7 +102,8 @@ static int colon_out_of_place(const bt_syntax *s, char *why)
     return s->line;
 }
 
-int bt_syntax_explain(const bt_syntax *s, char why[BT_SYNTAX_WHY])
+/// The slip behind the error: its line, with the remedy in why; 0 where it is none of those that are known.
+static int syntax_explain(const bt_syntax *s, char why[BT_SYNTAX_WHY])
 {
     const text_line here = line_of(s, s->line);
     if (memchr(here.begin, '\t', here.blank)) {
@@ -152,7 +153,7 @@ static void tell_syntax(const parser *p)
                          .problem = y->problem ? y->problem : "",
                          .line = (int)y->problem_mark.line + 1,
                          .begun = y->context ? (int)y->context_mark.line + 1 : 0};
-    const int line = bt_syntax_explain(&s, why);
+    const int line = syntax_explain(&s, why);
     if (line) bt_errors_add(p->err, "%s:%d: not valid YAML: %s", p->name, line, why);
     else
         bt_errors_add(p->err, "%s:%d: not valid YAML: %s%s%s; check indentation and colons near this line", p->name,

@@ -22,9 +22,6 @@ typedef struct bt_syntax {
 
 enum { BT_SYNTAX_WHY = 240 };
 
-/// The slip behind the error: its line, with the remedy in why; 0 where it is none of those that are known.
-int bt_syntax_explain(const bt_syntax *s, char why[BT_SYNTAX_WHY]);
-
 typedef enum { BT_NODE_SCALAR, BT_NODE_LIST, BT_NODE_MAP } bt_node_kind;
 
 typedef struct bt_node {

@@ -19,7 +19,8 @@ const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_
 static bt_shape_outline added[BT_MAX_ADDED_SHAPES];
 static int n_added;
 
-int bt_body_shape_named(bt_body_shape shape, double length, double width, double *v)
+/// Vertices of a shape that has a name, m: neither polygon nor none. As bt_shape_named.
+static int body_shape_named(bt_body_shape shape, double length, double width, double *v)
 {
     const int k = (int)shape - BT_OWN_SHAPES;
     if (k >= 0) return added[k](length, width, v);
@@ -61,7 +62,7 @@ static int outline_of(bt_body_shape shape, double length, double width, int n, c
 {
     if (shape == BT_BODY_ABSENT) return 0;
     if (shape != BT_BODY_POLYGON)
-        n = bt_body_shape_named(shape, length, width, v);
+        n = body_shape_named(shape, length, width, v);
     else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
     else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
     const char *reason = fault(n, v);

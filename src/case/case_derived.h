@@ -14,9 +14,6 @@ enum { BT_OWN_SHAPES = BT_BODY_ABSENT + 1 };
 
 extern const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1]; ///< ends with NULL
 
-/// Vertices of a shape that has a name, m: neither polygon nor none. As bt_shape_named.
-int bt_body_shape_named(bt_body_shape shape, double length, double width, double *v);
-
 /// Corners v [n][2] of an outline with its centroid at the origin. Returns n; 0, and names the fault in *why (or NULL),
 /// when there is no such outline.
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,

@@ -19,12 +19,6 @@
 
 // What has been registered beside the program's own quantities.
 
-int bt_n_registered(void);
-const bt_quantity *bt_registered(int k);
-
-/// Why there can be no series of this name, or not `more` of them, into err.
-void bt_registry_check(const char *name, int more, bt_errors *err);
-
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
 const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};
 const char *const bt_applies_codes[BT_APPLIES_KINDS] = {
@@ -46,9 +40,6 @@ enum { MOST_NAME = 48, MOST_KEY = 80 }; // of the 40 letters that a force law ma
 static bt_quantity added[BT_MAX_ADDED];
 static char added_keys[BT_MAX_ADDED][MOST_KEY];
 static int n_added;
-
-int bt_n_registered(void) { return n_added; }
-const bt_quantity *bt_registered(int k) { return &added[k]; }
 
 static bool is_taken(const char *name)
 {
@@ -82,7 +73,8 @@ static char *in_words(const char *name)
     return words;
 }
 
-void bt_registry_check(const char *name, int more, bt_errors *err)
+/// Why there can be no series of this name, or not `more` of them, into err.
+static void registry_check(const char *name, int more, bt_errors *err)
 {
     if (!bt_is_name(name, MOST_NAME))
         bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
@@ -98,7 +90,7 @@ bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = q->name ? q->name : "";
-    bt_registry_check(name, 1, err);
+    registry_check(name, 1, err);
     if (!q->units || !*q->units)
         bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
     if (!q->description || strlen(q->description) < 8)
@@ -119,9 +111,6 @@ bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
 }
 
 // --- of force laws ---------------------------------------------------------------------------------------------------
-
-/// Register a quantity for each series of the table of force laws that is none of the program's own series, once.
-void bt_force_quantities(void);
 
 /// Is its force one of the program's own series?
 static bool has_series(const bt_force_series *of)
@@ -144,7 +133,8 @@ static void add_quantity(const bt_force_series *of)
     bt_errors_free(&err);
 }
 
-void bt_force_quantities(void)
+/// Register a quantity for each series of the table of force laws that is none of the program's own series, once.
+static void force_quantities(void)
 {
     static int known; // series of the table that have been looked at
     for (; known < bt_n_force_series; known++) {
@@ -155,13 +145,6 @@ void bt_force_quantities(void)
 
 // --- of contact laws -------------------------------------------------------------------------------------------------
 
-/// Those of the program's own, in the order of the laws.
-int bt_n_law_series(void);
-const bt_quantity *bt_law_series(int k);
-
-/// Register a quantity for each number of the added laws, once.
-void bt_contact_quantities(void);
-
 static bt_quantity own[BT_MAX_LAW_NUMBERS];
 
 static double own_number(const bt_world *w, const void *quantity)
@@ -169,14 +152,15 @@ static double own_number(const bt_world *w, const void *quantity)
     return w->stats.laws[(const bt_quantity *)quantity - own];
 }
 
-int bt_n_law_series(void)
+/// Those of the program's own, in the order of the laws.
+static int n_law_series(void)
 {
     static int n; // asked for every quantity of every step
     if (n == 0) n = bt_law_first_number(BT_LAWS);
     return n;
 }
 
-const bt_quantity *bt_law_series(int k)
+static const bt_quantity *law_series(int k)
 {
     for (int law = 0, i = 0; !own[k].name && law < BT_LAWS; law++)
         for (int j = 0; j < bt_laws[law]->n_numbers; j++, i++) {
@@ -219,7 +203,8 @@ static void add_law(int law)
     }
 }
 
-void bt_contact_quantities(void)
+/// Register a quantity for each number of the added laws, once.
+static void contact_quantities(void)
 {
     static int known;
     for (; known < bt_n_contact_laws(); known++) add_law(known);
@@ -227,32 +212,32 @@ void bt_contact_quantities(void)
 
 // --- all of them -----------------------------------------------------------------------------------------------------
 
-int bt_n_program_series(void) { return bt_n_own_series + bt_n_law_series(); }
+int bt_n_program_series(void) { return bt_n_own_series + n_law_series(); }
 int bt_n_series(void) { return bt_n_program_series() + bt_n_added(); }
 
 const bt_quantity *bt_series(int k)
 {
-    const int before = bt_n_own_series - BT_SERIES_AFTER_LAWS, laws = bt_n_law_series();
+    const int before = bt_n_own_series - BT_SERIES_AFTER_LAWS, laws = n_law_series();
     if (k < before) return &bt_own_series[k];
-    if (k < before + laws) return bt_law_series(k - before);
-    return k < bt_n_program_series() ? &bt_own_series[k - laws] : bt_registered(k - bt_n_program_series());
+    if (k < before + laws) return law_series(k - before);
+    return k < bt_n_program_series() ? &bt_own_series[k - laws] : &added[k - bt_n_program_series()];
 }
 
 int bt_n_added(void)
 {
-    bt_force_quantities();
-    bt_contact_quantities();
-    return bt_n_registered();
+    force_quantities();
+    contact_quantities();
+    return n_added;
 }
 
-const bt_quantity *bt_added(int k) { return bt_registered(k); }
+const bt_quantity *bt_added(int k) { return &added[k]; }
 
 /// For a law that is about to be registered, whose series are taken up when they are asked for first.
 static bool may_be(const char *name, int more, bt_errors *err)
 {
     const size_t before = err->n;
     bt_n_added(); // those of the laws before it
-    bt_registry_check(name, more, err);
+    registry_check(name, more, err);
     return err->n == before;
 }
 

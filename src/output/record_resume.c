@@ -67,7 +67,9 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *s, const char *why)
     old->status = BT_ERR_CASE;
 }
 
-void bt_record_check_run(bt_snapshot *s, bt_h5_reader *old)
+/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
+/// the first n entries x of series k.
+static void record_check_run(bt_snapshot *s, bt_h5_reader *old)
 {
     char *its = bt_h5_read_word(old, IDENTITY);
     if (strcmp(its ? its : "", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)
@@ -83,8 +85,8 @@ static double entry_of(bt_keep keep, const double *step, int64_t every)
     return bt_record_merged(keep, m, every);
 }
 
-void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
-                            bt_h5_reader *old)
+static void record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
+                                bt_h5_reader *old)
 {
     static const struct {
         const char *name;
@@ -108,7 +110,9 @@ void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t 
     }
 }
 
-bt_status bt_record_keep_case(const bt_record *r, bt_errors *err)
+/// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
+/// of it. Errors: BT_ERR_IO.
+static bt_status record_keep_case(const bt_record *r, bt_errors *err)
 {
     char *path = bt_file_join(r->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(r->c);
     size_t size = 0;
@@ -268,7 +272,7 @@ static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, i
         if (may_lack(k) && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = 0;
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
-        if (old->status == BT_OK) bt_record_check_series(r, k, x, n, s, old);
+        if (old->status == BT_OK) record_check_series(r, k, x, n, s, old);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
@@ -382,7 +386,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     if (first) {
         load_history(&r->history, s, step);
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
-        if (!s->faulty && old.status == BT_OK) bt_record_check_run(s, &old);
+        if (!s->faulty && old.status == BT_OK) record_check_run(s, &old);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) load_series(r, s, &old, entries);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
@@ -395,7 +399,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     bt_h5_end(&old);
     if (status == BT_OK && first) bt_record_flush(r);
     if (status == BT_OK) status = r->h5.status;
-    if (status == BT_OK && first) status = bt_record_keep_case(r, err);
+    if (status == BT_OK && first) status = record_keep_case(r, err);
     if (status == BT_OK && first) status = bt_record_remove(r, "summary.json", err); // of an end that is none any more
     free(path);
     return bt_comm_agree(r->comm, status);

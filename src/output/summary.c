@@ -50,7 +50,7 @@ void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
             laps);
 }
 
-void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
+static void summary_window_warn(bt_errors *warnings, const bt_window *v)
 {
     if (!v) return;
     const double places = (double)(v->renewed + v->missed),
@@ -285,7 +285,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
     bt_field_size_warn(c, &t->sizes, &s->warnings);
     if (t->mean_thickness > 0) bt_ice_warn(c, t->mean_size, t->mean_thickness, &s->warnings);
     warn_of_events(s, t->events);
-    bt_summary_window_warn(&s->warnings, t->window);
+    summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_warn(&s->warnings, BT_WARN_FLOES_LEFT,
                 "%lld floes left the open domain and resist no more; use a larger domain or walls if that "

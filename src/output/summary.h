@@ -51,6 +51,5 @@ void bt_summary_free(bt_summary *s);
 void bt_summary_window_print(const bt_window *v);
 /// Of a moving window that goes, or is to go, so many times its length through the ice.
 void bt_summary_window_warn_laps(bt_errors *warnings, double laps);
-void bt_summary_window_warn(bt_errors *warnings, const bt_window *v);
 
 #endif

@@ -25,7 +25,9 @@
 
 #define JOURNAL "journal.jsonl"
 
-void bt_journal_add(const char *dir, const char *event, const char *member, double wall, int code)
+/// Add a line, in one write: lines of several processes do not mix. wall: s, NAN = not known. A line that cannot be
+/// written is left out.
+static void journal_add(const char *dir, const char *event, const char *member, double wall, int code)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -121,7 +123,7 @@ bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_option
 
 void bt_ensemble_journal(const bt_ensemble *e, const char *event, const bt_member *m, double wall, int code)
 {
-    bt_journal_add(e->o->dir, event, m->name, wall, code);
+    journal_add(e->o->dir, event, m->name, wall, code);
 }
 
 bool bt_entry_is_suspect(const bt_entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }

@@ -26,7 +26,7 @@ void bt_islands_free(bt_islands *s)
 }
 
 /// With path halving.
-bt_idx bt_islands_root(bt_islands *s, bt_idx i)
+static bt_idx islands_root(bt_islands *s, bt_idx i)
 {
     while (s->root[i] != i) i = s->root[i] = s->root[s->root[i]];
     return i;
@@ -34,7 +34,7 @@ bt_idx bt_islands_root(bt_islands *s, bt_idx i)
 
 bt_idx bt_islands_of(const bt_world *w, bt_islands *s, const bt_contact *u)
 {
-    return bt_islands_root(s, w->bodies.inv[u->a].m > 0 ? u->a : u->b);
+    return islands_root(s, w->bodies.inv[u->a].m > 0 ? u->a : u->b);
 }
 
 static void make_room(const bt_bodies *b, bt_islands *s)
@@ -63,12 +63,12 @@ void bt_islands_make(bt_world *w, bt_islands *s, bool (*joins)(const bt_cell *ce
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
             const bt_contact *u = &cell->contacts[j];
             if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || (joins && !joins(cell, j))) continue;
-            s->root[bt_islands_root(s, u->b)] = bt_islands_root(s, u->a);
+            s->root[islands_root(s, u->b)] = islands_root(s, u->a);
         }
     }
     if (!w->domain) return;
     bt_gid *name = bt_alloc((size_t)b->n, sizeof *name);
-    for (bt_idx i = 0; i < b->n; i++) name[i] = s->name[bt_islands_root(s, i)];
+    for (bt_idx i = 0; i < b->n; i++) name[i] = s->name[islands_root(s, i)];
     bt_domain_join_names(w, name);
     for (bt_idx i = 0; i < b->n; i++)
         if (s->root[i] == i) s->name[i] = name[i];
@@ -225,7 +225,7 @@ static void imbalance(bt_world *w, bt_islands *s)
             const bt_vel *d = &w->solver->shift[i];
             if (b->inv[i].m == 0 || (d->x == 0 && d->y == 0 && d->w == 0)) continue;
             const double moment = b->inv[i].i > 0 ? fabs(d->w) / (b->inv[i].i * b->radius[i]) : 0;
-            bt_sum_add(&s->sum[bt_islands_root(s, i)], bt_hypot(d->x, d->y) / b->inv[i].m + moment);
+            bt_sum_add(&s->sum[islands_root(s, i)], bt_hypot(d->x, d->y) / b->inv[i].m + moment);
         }
     }
     bt_islands_add(w, s);

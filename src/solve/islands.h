@@ -27,8 +27,6 @@ void bt_islands_free(bt_islands *s);
 /// Collective. Join the bodies of all contacts of this step that `joins` takes (NULL: of all).
 void bt_islands_make(bt_world *w, bt_islands *s, bool (*joins)(const bt_cell *cell, bt_idx contact));
 
-/// Root of the island of a movable body.
-bt_idx bt_islands_root(bt_islands *s, bt_idx body);
 /// The same of a contact with at least one movable body.
 bt_idx bt_islands_of(const bt_world *w, bt_islands *s, const bt_contact *u);
 

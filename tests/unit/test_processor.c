@@ -20,7 +20,7 @@ static const char *lacking = "nothing";
 #define __BMI2__ 1
 #define __builtin_cpu_supports(feature) (strcmp(feature, lacking) != 0)
 #endif
-#include "app/main.c"
+#include "app/processor.c"
 
 /// The exit code of a process that checks and goes on with code 7, and what it has written to stderr.
 static int check_on(const char *processor_lacks, char *said, size_t size)

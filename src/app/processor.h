@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: MIT
+// Has this processor what the program was compiled for?
+#ifndef BT_PROCESSOR_H
+#define BT_PROCESSOR_H
+
+/// Ends the program with a message and code 2 if not. May be called before the constructors of libraries.
+void bt_processor_check(void);
+
+#endif
