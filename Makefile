@@ -35,7 +35,7 @@ HDF5_LIBS   := $(or $(call flags,--libs,$(HDF5)),-lhdf5)
 HDF5_HL     := $(filter -L%,$(HDF5_LIBS)) -lhdf5_hl
 
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
-# same reason the target is the plain x86-64 (or ARM); only functions with BT_FOR_EACH_CPU (src/base/cpu.h),
+# same reason the target is the plain x86-64 (or ARM); only functions with BT_FOR_EACH_CPU (src/base/inside.h),
 # where the time goes, are also compiled for AVX2.
 # -fPIC: the program and the shared library are made of the same objects; without interposition it costs no instruction.
 # -Wno-psabi: how vectors of four are passed to functions does not matter, as all of those are inlined.

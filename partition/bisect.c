@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Recursive coordinate bisection: split along the longer side where the weight divides as the parts do, and again.
 // (Berger & Bokhari 1987, IEEE Trans. Comput. C-36.) Needs no graph and cannot fail: the fallback behind METIS.
-#include "partition/cut_method.h"
+#include "partition/cut.h"
 
 #include <stdlib.h>
 

@@ -20,7 +20,6 @@
 #include <string.h>
 
 #include "bergtow/base.h"
-#include "partition/cut_method.h"
 
 static const double KEEP = 1.25;  // what the old labels may be worse by
 // imbalances within this factor of the best count as equal when none is within the tolerance

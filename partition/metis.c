@@ -13,7 +13,7 @@
 //     out of malloc leaves the heap locked (seen: a hang in the free that follows). So SIGTERM is blocked meanwhile and
 //     comes after. METIS raises it itself only for arguments that cannot occur here. In another thread the handler
 //     would jump into nowhere: see cut.h. Rejected: to let it return METIS_ERROR and raise the signal again.
-#include "partition/cut_method.h"
+#include "partition/cut.h"
 
 #include <limits.h>
 #include <metis.h>

@@ -8,7 +8,7 @@
 // with some ten cells a part it stops with slopes of one cell a part over the whole field.
 // Cut. A vertex goes to the neighbour part that it has more edges with, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
-#include "partition/cut_method.h"
+#include "partition/cut.h"
 
 #include <stdlib.h>
 

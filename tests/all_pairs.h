@@ -4,7 +4,7 @@
 #define BT_ALL_PAIRS_H
 
 #include "scene.h"
-#include "contact/merge.h"
+#include "contact/contacts.h"
 
 /// The contacts of everything within the margin, whether at rest or not.
 static inline void detect_all(bt_world *w, double margin)

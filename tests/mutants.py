@@ -56,17 +56,6 @@ MUTANTS = {
          "BT_DYNAMIC && b->thickness[i] > 0 && bt_domain_owns(w, i) &&", "a lee without a flow"),
         ("(w->par.lee_reach + 2 * t->reach", "(0 * t->reach", "floes beyond the next cell"),
     ]),
-    "src/force/load.c": (DRAG, [
-        ("0.57735026918962576451", "0.5", "Gauss points of no rule"),
-        ("if (in0 <= 0 && in1 <= 0) continue;", "", "the lee side pushes, too"),
-        ("const double from = in0 < 0 ? in0 / (in0 - in1) : 0,", "const double from = 0,",
-         "inflow where there is none"),
-        ("a->gw += g * (x * x + y * y);", "a->gw += g * (x * x);", "half of the moment of form drag"),
-        ("a->jw += g * (x * ref_y - y * ref_x);", "a->jw += g * (x * ref_y + y * ref_x);", "moment of the stream"),
-        ("a->gx += g * x;", "a->gx -= g * x;", "coupling of turn and sway"),
-        ("const double along = (1 - share) /", "const double along = 1 /", "the arm along a side twice"),
-        ("0.5 * (to - from) * form", "(to - from) * form", "twice the form drag"),
-    ]),
     "src/force/load.h": (DRAG, [
         ("u->x = l->about_x + r->c * x - r->s * y;", "u->x = l->about_x + r->c * x + r->s * y;", "no rotation"),
         ("l->gw + l->yaw * fabs(w)", "l->gw + l->yaw * w", "yaw drag drives one way"),
@@ -108,7 +97,7 @@ MUTANTS = {
          "floes outside the region count after a lead"),
         ("of.ice.x_min = r[0], of.ice.y_min", "of.ice.y_min", "a field's region is the domain"),
     ]),
-    "src/field/sizes.c": ([EDGES + "what_leaves_no_sizes_is_refused",
+    "src/field/field_make.c": ([EDGES + "what_leaves_no_sizes_is_refused",
                            EDGES + "floes_below_the_least_size_are_counted"], [
         ("s.below += d < limit;", "s.below += d < 0.5 * limit;", "floes below the least size"),
     ]),
@@ -131,7 +120,8 @@ MUTANTS = {
                                 "cli/test_check_study.py", "cli/test_budget.py"], [
         ("kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;", "true;", "radians as degrees"),
     ]),
-    "src/force/forces.c": (DRAG + ["unit/test_cells"], [
+    "src/force/forces.c": (DRAG + ["unit/test_cells"] + DRAG + ["physics/test_force_law", "cli/test_balance.py", "scenes:free_drift_start,speed",
+                              "cli/test_environment.py::test_tilt_of_the_sea_along_a_course"], [
         ("{1 / (m + dt * a.g), 1 / (inertia + dt * a.gw)};", "{1 / m, 1 / (inertia + dt * a.gw)};", "explicit mass"),
         ("1 / (inertia + dt * a.gw)};", "1 / inertia};", "yaw drag outside the effective inertia"),
         (".water_form = 0.5 * water_density", ".water_form = water_density", "twice the form drag of the water"),
@@ -145,9 +135,15 @@ MUTANTS = {
         ("*(const bool *)rest && bt_bodies_drift(w, &b->vel[i])", "bt_bodies_drift(w, &b->vel[i])",
          "what drifts with the water feels no wind"),
         ("if (t->asleep[k]) t->asleep[k] = BT_ASLEEP;", "", "a cell never falls asleep whole"),
-    ]),
-    "src/force/impulses.c": (["physics/test_force_law", "cli/test_balance.py", "scenes:free_drift_start,speed",
-                              "cli/test_environment.py::test_tilt_of_the_sea_along_a_course"], [
+        ("0.57735026918962576451", "0.5", "Gauss points of no rule"),
+        ("if (in0 <= 0 && in1 <= 0) continue;", "", "the lee side pushes, too"),
+        ("const double from = in0 < 0 ? in0 / (in0 - in1) : 0,", "const double from = 0,",
+         "inflow where there is none"),
+        ("a->gw += g * (x * x + y * y);", "a->gw += g * (x * x);", "half of the moment of form drag"),
+        ("a->jw += g * (x * ref_y - y * ref_x);", "a->jw += g * (x * ref_y + y * ref_x);", "moment of the stream"),
+        ("a->gx += g * x;", "a->gx -= g * x;", "coupling of turn and sway"),
+        ("const double along = (1 - share) /", "const double along = 1 /", "the arm along a side twice"),
+        ("0.5 * (to - from) * form", "(to - from) * form", "twice the form drag"),
         ("q->dt * (a.jx - a.g * u->x + a.gy * f->w)", "q->dt * (a.jx - a.g * u->x)", "coupling left out of the record"),
         ("q->dt * (a.jy - a.g * u->y - a.gx * f->w)", "q->dt * (a.jy - a.g * f->y - a.gx * f->w)", "drag at U*"),
         ("l->turn == 0 ? 0 : l->turn / q->turn", "1", "all of the turn for each law"),
@@ -206,29 +202,10 @@ MUTANTS = {
         ("b[i] + m->w12 * l[1 - i]", "b[i]", "points are not coupled"),
         ("- m->w12 * u->ln[1 - i];", ";", "impulse of the other point stays in the velocity"),
     ]),
-    "src/solve/restitution.c": (["unit/test_restitution", "physics/test_impacts",
-                                 "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
-                                 "parallel/test_ranks.py"], [
-        ("t->most = bt_max(t->most, w->bodies.restitution[cell->contacts[j].b]);", "",
-         "no rebound is ever lowered"),
-        ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
-        ("bt_contacts_unsolved_work(u, w->stats.residual)", "0", "rounding lowers rebounds"),
-        ("        any = 1;\n    }\n    bt_domain_maxima(w, &any, 1);", "        any = 1;\n    }",
-         "ranks disagree whether to solve again"),
-        ("if (u->ln[0] + u->ln[1] == 0 || u->n == 0) continue;", "if (u->ln[0] + u->ln[1] == 0) continue;",
-         "sheets pay for rebounds"),
-        ("bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);", ";", "a lowered rebound stays lowered"),
-    ]),
     "src/solve/islands.c": (["unit/test_restitution", "cli/test_locked.py::test_bodies_that_cannot_give_way",
                              "physics/test_impacts",
                              "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
-                             "parallel/test_ranks.py::test_the_same_bits[jam-2-1]"], [
-        ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
-        ("s->root[bt_islands_root(s, u->b)] = bt_islands_root(s, u->a);", "", "every floe an island"),
-        ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
-        ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
-    ]),
-    "src/solve/locked.c": (["cli/test_locked.py::test_bodies_that_cannot_give_way",
+                             "parallel/test_ranks.py::test_the_same_bits[jam-2-1]"] + ["cli/test_locked.py::test_bodies_that_cannot_give_way",
                             "cli/test_locked.py::test_a_wedge_below_its_angle_of_friction_has_no_load",
                             "cli/test_locked.py::test_a_wedge_above_it_is_not_locked_when_work_is_short",
                             "cli/test_locked.py::test_a_wedge_that_is_dragged_out_is_not_locked",
@@ -236,6 +213,10 @@ MUTANTS = {
                             "test_friction_proves_nothing_of_loads_that_the_sweeps_have_not_come_to",
                             "cli/test_locked.py::test_a_lock_below_the_tolerance_is_none_beside_a_jam_either",
                             "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
+        ("b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || ", "", "a wall makes one island of all"),
+        ("s->root[islands_root(s, u->b)] = islands_root(s, u->a);", "", "every floe an island"),
+        ("bt_domain_join_names(w, name);", "", "an island ends where a rank does"),
+        ("bt_domain_add_by_name(w, s->root, s->name, s->sum);", ";", "each rank has sums of its own"),
         ("if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;\n    const bt_limit *k = cell->laws.limits ? "
          "&cell->laws.limits[j] : NULL;", "const bt_limit *k = NULL;", "what rafts is hard"),
         ("power -= u->ln[c]", "power += u->ln[c]", "parting counts as approach"),
@@ -267,7 +248,9 @@ MUTANTS = {
         ("if (*(const bool *)shifted) g->gap[i] +=", "if (*(const bool *)shifted) g->gap[i] -=",
          "the second projection sees the first backwards"),
     ]),
-    "src/solve/solver.c": (SOLVE + ["physics/test_tow", "unit/test_cells", "scenes:line,solver_settings,cold_start"], [
+    "src/solve/solver.c": (SOLVE + ["physics/test_tow", "unit/test_cells", "scenes:line,solver_settings,cold_start"] + ["unit/test_restitution", "physics/test_impacts",
+                                 "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
+                                 "parallel/test_ranks.py"], [
         ("#define UPDATES 6.0", "#define UPDATES 2.0", "steps end before they are solved"),
         ("#define ENOUGH 0.3", "#define ENOUGH 3.0", "cells are left too early"),
         ("u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);", ";", "impulses start beyond their bound"),
@@ -290,6 +273,15 @@ MUTANTS = {
         ("bt_rounds_move(o, &u->lt, x + 2, y[j] + 2, 1);", "", "no momentum of friction"),
         (".cap = 0.9,\n        .length = 20", ".cap = 0.9,\n        .length = 10", "rounds of another length"),
         ("if (most <= ENOUGH * o->problem->tolerance) break;", "", "inner sweeps for nothing"),
+        ("t->most = bt_max(t->most, w->bodies.restitution[cell->contacts[j].b]);", "",
+         "no rebound is ever lowered"),
+        ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
+        ("bt_contacts_unsolved_work(u, w->stats.residual)", "0", "rounding lowers rebounds"),
+        ("        any = 1;\n    }\n    bt_domain_maxima(w, &any, 1);", "        any = 1;\n    }",
+         "ranks disagree whether to solve again"),
+        ("if (u->ln[0] + u->ln[1] == 0 || u->n == 0) continue;", "if (u->ln[0] + u->ln[1] == 0) continue;",
+         "sheets pay for rebounds"),
+        ("bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);", ";", "a lowered rebound stays lowered"),
     ]),
     "src/solve/rounds.c": (SOLVE + ["unit/test_rounds", COPIES, "scenes:few_sweeps,periodic_dense"], [
         ("if (!(m->against <= 0)) {", "if (m->against > 1e300) {", "momentum never restarts"),
@@ -326,7 +318,7 @@ MUTANTS = {
         ("mine.me = omp_get_thread_num();", "mine.me = 0;", "every thread is the first"),
         ("if (o->team == 1) return;", "if (o->team <= 2) return;", "two threads do not wait"),
         ("into->most2 = bt_max(into->most2, from->most2);", "", "a second maximum of one thread"),
-        ("#pragma omp critical\n        bt_totals_merge(t, &own);", "", "totals of a thread are lost"),
+        ("#pragma omp critical\n        totals_merge(t, &own);", "", "totals of a thread are lost"),
         (".most = t->most, .most2 = t->most2};", "};", "maxima of busy cells begin at 0"),
     ]),
     "src/contact/pack.c": (["unit/test_contacts", "physics/test_contact_law",
@@ -351,7 +343,7 @@ MUTANTS = {
         ("if (meet_without(w, t, u) != released)", "if (released || meet_without(w, t, u))", "nothing comes back"),
         ("    bt_apply(u, -(u->ln[0]", "    if (false) bt_apply(u, -(u->ln[0]", "a row is judged with its own impulse"),
     ]),
-    "src/geometry/sweep.c": (["physics/test_passing"], [
+    "src/geometry/apart.c": (["physics/test_passing"], [
         ("bt_sincos(p->rate * t, &s, &c);", "bt_sincos(0, &s, &c);", "outlines do not turn"),
         ("const double k = bend + (a", "const double k = 0 * (a", "the bend of the way"),
     ]),
@@ -379,7 +371,7 @@ MUTANTS = {
         ("low[0] - c.shift[0], low[1] - c.shift[1]", "low[0], low[1]", "a polygon is not found across a period"),
     ]),
     "src/contact/detect.c": (["unit/test_contacts", "physics/test_crush", "physics/test_parts", "unit/test_cells",
-                              COPIES, "scenes:speed_dense,periodic_dense,window"], [
+                              COPIES, "scenes:speed_dense,periodic_dense,window"] + ["physics/test_parts"], [
         ("if (paths + t->margin < p->axes.reach) {", "if (paths < p->axes.reach) {", "the margin is not kept"),
         ("bt_laws_on(&w->par) ? w->par.slop : 0;", "w->par.slop;", "rigid contacts have points beyond the margin"),
         ("if (again && cell->active && margin <= cell->margin) continue;", "if (again && cell->active) continue;",
@@ -392,12 +384,7 @@ MUTANTS = {
         ("bt_domain_tell_cells(w, t->speed, spread);", "", "speeds of other ranks"),
         ("if (movable) t->bound[n] = bt_max(t->bound[n], fastest);", "", "the body does not see fast floes"),
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
-    ]),
-    "src/contact/merge.c": (["physics/test_parts"], [
         ("|| (t[j].m->n_points == 1 && j < i)", "", "a corner at a cut is two points"),
-    ]),
-    "src/contact/work.c": (["unit/test_restitution"], [
-        ("+ fabs(u->lt));", ");", "what a residual can have given leaves friction out"),
     ]),
     "src/contact/overlap.c": (["physics/test_rafting"], [
         ("* bt_min(1, depth / blend);", ";", "sides that lie on each other push"),
@@ -425,7 +412,7 @@ MUTANTS = {
         ("bt_max(most.margin, depth + most.beside)", "most.margin", "a point beside the nearest one is not found"),
         ("(tilt > most.beside ? most.beside / tilt : 1)", "1", "a tilted edge bears along its whole length"),
     ]),
-    "src/contact/closing.c": (["physics/test_crush", "physics/test_rafting"], [
+    "src/contact/law_pair.c": (["physics/test_crush", "physics/test_rafting"] + ["unit/test_restitution"], [
         ("gap[i] <= bt_max(w->par.dt * approach, slop) ||", "true ||",
          "the margin of the search decides what is borne"),
         ("gap[i] <= bt_max(w->par.dt * approach, slop)", "gap[i] <= w->par.dt * approach + slop",
@@ -440,6 +427,7 @@ MUTANTS = {
         ("if (m->n_points == 1 || !c->point[1 - i]) return 1;", "if (m->n_points == 1) return 0.5;",
          "a single point bears half"),
         ("0.5 * (low + high)} : ", "low} : ", "patch at its end"),
+        ("+ fabs(u->lt));", ");", "what a residual can have given leaves friction out"),
     ]),
     "src/contact/added.c": (["physics/test_contact_law"], [
         ("x.closes[i] = closes[i];", "x.closes[i] = true;", "a law takes every point for one that closes"),
@@ -627,7 +615,7 @@ MUTANTS = {
     ]),
     "src/output/summary.c": (["unit/test_summary", EDGES + "estimates_are_those_of_the_leg_in_the_window",
                              EDGES + "the_ordered_speed_is_that_of_the_window",
-                             MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"], [
+                             MADE + "the_ordered_speed_is_that_over_the_current_of_the_window"] + ["unit/test_summary"], [
         ("if (isfinite(yaw) && !s->turns) straight", "if (false) straight",
          "the width at the start, not in the window"),
         ("in->ordered = speed - (along - ice[0]);", "in->ordered += ice[0] - water[0];", "the current of the run"),
@@ -638,6 +626,9 @@ MUTANTS = {
         ("    if (adrift) {", "    if (false) {", "estimates of a body that nothing tows"),
         ("in->along = ice[0], in->speed", "in->speed", "the speed ordered"),
         ("return s->window.met_no_ice ? NAN : s->ice.mean;", "return s->ice.mean;", "0 held against an estimate"),
+        ("floes = (double)(v->renewed + v->kept);", "floes = (double)(v->renewed + v->missed);",
+         "floes that come back, of the places ahead"),
+        ("(double)v->kept > SHARE_LIMIT * floes", "(double)v->kept > floes", "disturbed ice that comes back"),
     ]),
     "src/loads/impact.c": (["physics/test_impacts", "physics/test_impact_loads", "cli/test_impacts.py",
                             "scenes:impacts_crushing,impact_duration"], [
@@ -735,11 +726,6 @@ MUTANTS = {
         ("if (!isnan(x) && !(x <= most)) most = x;", "if (!isnan(x)) most = x;",
          "the last branch, not the strongest"),
     ]),
-    "src/output/summary_window.c": (["unit/test_summary"], [
-        ("floes = (double)(v->renewed + v->kept);", "floes = (double)(v->renewed + v->missed);",
-         "floes that come back, of the places ahead"),
-        ("(double)v->kept > SHARE_LIMIT * floes", "(double)v->kept > floes", "disturbed ice that comes back"),
-    ]),
     "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting"], [
         ("TOTAL(F64, max_overlap, MAX, overlap,", "TOTAL(F64, max_overlap, LAST, overlap,", "largest overlap"),
         ("TOTAL(F64, contact_work, SUM, contact_work,", "TOTAL(F64, contact_work, LAST, contact_work,",
@@ -754,7 +740,7 @@ MUTANTS = {
         ("r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS", "true", "a negative number of steps in a row"),
         ("isfinite(r->totals.wall_time)", "true", "a wall time that is no number"),
     ]),
-    "src/run/study_axes.c": (["cli/test_bad_study.py"], [
+    "src/run/study.c": (["cli/test_bad_study.py"], [
         ("*y = sorted[first];", "*y = sorted[i - 1];", "a parameter's own key under a second of its values"),
         ("if (x->axis == y->axis && s->parameter[y->axis].name != y->text) continue;", "",
          "each value of a parameter has keys of its own"),
@@ -837,15 +823,13 @@ MUTANTS = {
         ("status == BT_OK && last) status = bt_checkpoint_write",
          "status == BT_OK && last && 0) status = bt_checkpoint_write", "no last checkpoint"),
     ]),
-    "src/output/record_resume.c": (FILES + ENDS + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
+    "src/output/record_resume.c": (FILES + ENDS + ["cli/test_faults.py::test_nothing_is_lost[run]"] + ["cli/test_other_runs.py"], [
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, r->h5.status);",
          "    bt_status status = bt_comm_agree(r->comm, r->h5.status);", "frames of other ranks at a checkpoint"),
         ("        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);\n", "",
          "no checksum"),
         ("        bt_record_flush(r);\n        status = r->h5.status;", "        status = r->h5.status;",
          "not flushed"),
-    ]),
-    "src/output/record_run.c": (["cli/test_other_runs.py"], [
         ("if (strcmp(its ? its : \"\", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)", "if (0)",
          "what two runs began with is not compared"),
         ("if (entry == x[i] ||", "if (1 ||", "series are not compared with the history"),
@@ -866,7 +850,7 @@ MUTANTS = {
         ("sound ? before : damaged", "before", "a damaged checkpoint replaces a sound one"),
         ("if (status != BT_OK) unlink(part);", "", "a part stays under the temporary name"),
     ]),
-    "src/output/fclib.c": (SYNC + ["unit/test_fclib"], [
+    "src/output/dump.c": (SYNC + ["unit/test_fclib"], [
         ("if (status == BT_OK) status = bt_file_rename(temporary, path, err);", "rename(temporary, path);",
          "not synced"),
     ]),
@@ -888,7 +872,7 @@ MUTANTS = {
         ("if (errnum && h->status == BT_OK)", "if (0)", "series that cannot be read are empty rows"),
         ("t->unread += status == BT_ERR_IO;", "", "a member that cannot be read is left out without a word"),
     ]),
-    "src/run/ensemble_journal.c": (SYNC + ["cli/test_ensemble.py"], [
+    "src/run/ensemble_list.c": (SYNC + ["cli/test_ensemble.py"], [
         ("if (write(fd, line, (size_t)n) == n) fsync(fd);",
          "if (write(fd, line, (size_t)n) != n) (void)0;", "the journal is not synced"),
     ]),

@@ -2,7 +2,7 @@
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
 // Folder. DIR/study.resolved.yml says what the members are, DIR/study.files what is in the files that they name
-// (src/run/study_files.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
+// (src/run/study.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
 // file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed
 // when it holds failed.txt (first line: exit code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where
 // that takes no file), and else waits. DIR/journal.jsonl has a line for each start and end, with wall times (null where
@@ -20,7 +20,7 @@
 // finished and sound.
 //
 // Who does what. Whoever works on a member holds a lock on members/NAME/lock, which the system releases when the
-// process ends, however it ends, and the lock of its result folder (src/base/lock.h): a member that a `bergtow
+// process ends, however it ends, and the lock of its result folder (src/base/fileio.h): a member that a `bergtow
 // resume` is at stays open, and is waited for as for one of another call. So groups of ranks, jobs of an array on a
 // cluster, and a call that resumes a killed one need no word between them: each takes the next member that is
 // neither finished, failed nor locked, the longest first by an estimate, with a limit of wall time field by field,

@@ -31,7 +31,7 @@ typedef struct bt_run_options {
     /// print what is wrong with a step (bt_errors_print) before the state before it is made again, which may take long;
     /// errors then have what comes after
     bool aloud;
-    bool held;                ///< the caller has locked dir (src/base/lock.h), and lifts that
+    bool held;                ///< the caller has locked dir (src/base/fileio.h), and lifts that
     const char *fields;       ///< folder of fields that other runs have, too (src/field/field_kept.h), NULL = none
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;

@@ -217,7 +217,7 @@ typedef struct bt_step_stats {
     int64_t misjudged;       ///< rows at the end of pairs that pass, and pairs that meet without (contact/passing.h)
     double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s
     bool converged;
-    bool locked;             ///< it did not, and some bodies cannot give way to any load (src/solve/locked.h)
+    bool locked;             ///< it did not, and some bodies cannot give way to any load (src/solve/islands.h)
     bool no_load;            ///< of these, some press on the towed body: its load has no bound
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there

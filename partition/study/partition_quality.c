@@ -24,7 +24,6 @@
 
 #include "bergtow/base.h"
 #include "partition/cut.h"
-#include "partition/cut_method.h"
 #include "base/elementary.h"
 
 static const double DIAMETER = 30, CONCENTRATION = 0.8, JITTER = 0.3, REACH = 1.05, BERG = 100, TOLERANCE = 0.03;

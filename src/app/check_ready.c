@@ -14,7 +14,7 @@
 #include "case/ice_bounds.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
-#include "output/summary_window.h"
+#include "output/summary.h"
 #include "base/elementary.h"
 #include "split/law.h"
 

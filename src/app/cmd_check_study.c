@@ -13,7 +13,7 @@
 #include "base/units.h"
 #include "case/schema.h"
 #include "case/case_base.h"
-#include "run/study_axes.h"
+#include "run/study.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -1,13 +1,106 @@
 // SPDX-License-Identifier: MIT
 // bergtow ensemble: the members of a study.
-#include "bergtow/ensemble.h"
-#include "app/cmd.h"
-#include "app/jobs.h"
-#include "base/largest.h"
-
+#include <errno.h>
+#include <signal.h>
+#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "bergtow/ensemble.h"
+#include "app/cmd.h"
+#include "base/largest.h"
+
+// --- processes -------------------------------------------------------------------------------------------------------
+
+// Processes that share the members of an ensemble with the one that a user has started.
+//
+// Members are independent, and a field of some thousand floes keeps one core busy: two processes of one thread each
+// take less time for them than one of two threads, and half of the processor time, and on many cores the difference is
+// a factor. That several calls may work on one folder is there for job arrays; so a call starts itself again. Rejected:
+// members in the threads of one process, as the team of OpenMP, signals and the first error all are of a process.
+
+/// What bt_ensemble_run calls to have help. argv: of the command `ensemble`; it must outlive the calls.
+typedef struct bt_jobs {
+    int argc;
+    char **argv;
+    int n;
+    long pid[BT_MAX_JOBS]; ///< [n] 0: could not be started
+    char threads[16];
+} bt_jobs;
+
+static const char mark[] = "BERGTOW_JOB";
+
+/// Is this process one of them? Then it also ends, with checkpoints, when the one that started it has ended.
+static bool jobs_is_one(void)
+{
+    const char *parent = getenv(mark);
+    if (!parent) return false;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != (pid_t)atol(parent)) raise(SIGTERM); // it has ended meanwhile
+    return true;
+}
+
+/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started, or is killed, is reported and
+/// done without.
+static void jobs_start(void *of, int n, int threads)
+{
+    bt_jobs *j = of;
+    char **words = bt_alloc((size_t)j->argc + 5, sizeof *words);
+    int k = 0;
+    words[k++] = "bergtow";
+    words[k++] = "ensemble";
+    snprintf(j->threads, sizeof j->threads, "%d", threads);
+    words[k++] = "--threads"; // before the user's words, among which -- may end the options
+    words[k++] = j->threads;
+    words[k++] = "--no-wait";
+    for (int i = 1; i < j->argc; i++) words[k++] = j->argv[i];
+    words[k] = NULL;
+
+    char parent[24];
+    snprintf(parent, sizeof parent, "%ld", (long)getpid());
+    setenv(mark, parent, 1);
+    // bound to the place of this thread, all would share one core
+    char *bind = getenv("OMP_PROC_BIND") ? bt_text_copy(getenv("OMP_PROC_BIND")) : NULL;
+    if (bind) setenv("OMP_PROC_BIND", "false", 1);
+    for (int i = 0; i < n && i < BT_MAX_JOBS; i++) {
+        pid_t pid;
+        const int error = posix_spawn(&pid, "/proc/self/exe", NULL, NULL, words, environ);
+        j->pid[j->n++] = error == 0 ? pid : 0;
+        if (error != 0)
+            fprintf(stderr,
+                    "bergtow: warning: job %d of %d could not be started: %s; the others take its members; to have as "
+                    "many, raise the limit on processes (ulimit -u), or ask for fewer with --jobs\n",
+                    i + 2, n + 1, strerror(error));
+    }
+    unsetenv(mark);
+    if (bind) setenv("OMP_PROC_BIND", bind, 1);
+    free(bind);
+    free(words);
+}
+
+static void jobs_end(void *of, bool stop)
+{
+    bt_jobs *j = of;
+    for (int i = 0; i < j->n && stop; i++)
+        if (j->pid[i] > 0) kill((pid_t)j->pid[i], SIGTERM);
+    for (int i = 0; i < j->n; i++) {
+        int how = 0;
+        while (j->pid[i] > 0 && waitpid((pid_t)j->pid[i], &how, 0) < 0 && errno == EINTR) continue;
+        // all else it has said itself
+        if (!stop && WIFSIGNALED(how))
+            fprintf(stderr,
+                    "bergtow: warning: job %d of %d was ended by signal %d (%s); the others took its members over; "
+                    "where memory is short, ask for fewer jobs with --jobs\n",
+                    i + 2, j->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
+    }
+    j->n = 0;
+}
+
+// --- the command -----------------------------------------------------------------------------------------------------
 
 typedef struct {
     bt_cmd_case file; ///< the study, and what replaces values of it
@@ -79,8 +172,8 @@ int bt_cmd_ensemble(int argc, char **argv)
     char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
     if (folder) o.run.dir = folder;
     bt_jobs jobs = {.argc = argc, .argv = argv};
-    o.run.helpers = &(bt_ensemble_helpers){.start = bt_jobs_start, .end = bt_jobs_end, .of = &jobs};
-    o.run.job = bt_jobs_is_one();
+    o.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
+    o.run.job = jobs_is_one();
     if (o.run.job) o.run.retry = false; // the call that started it has forgotten the failures, and records new ones
     bt_study s = {0};
     bt_errors err = {0};

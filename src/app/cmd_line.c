@@ -2,7 +2,7 @@
 // What the commands share: option parsing with suggestions, the case argument, the way out.
 #include "app/cmd.h"
 #include "base/fileio.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "base/units.h"
 
 #include <errno.h>

@@ -3,7 +3,7 @@
 // ensembles, so that judgement and pictures stand in one language.
 #include "app/cmd.h"
 #include "base/fileio.h"
-#include "base/launcher.h"
+#include "base/process.h"
 
 #include <limits.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
-#include "base/launcher.h"
+#include "base/process.h"
 #include "base/largest.h"
 #include "case/case_base.h"
 

@@ -5,7 +5,7 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/largest.h"
-#include "base/launcher.h"
+#include "base/process.h"
 #include "output/folder.h"
 
 #include <inttypes.h>

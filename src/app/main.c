@@ -4,8 +4,8 @@
 #include "app/cmd.h"
 #include "app/processor.h"
 #include "revision.h"
-#include "base/cores.h"
-#include "base/suggest.h"
+#include "base/process.h"
+#include "base/name.h"
 #include "case/case_base.h"
 #include "output/quantity_list.h"
 

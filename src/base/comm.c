@@ -15,7 +15,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/launcher.h"
+#include "base/process.h"
 
 #define ALONE {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1}
 const bt_comm bt_comm_alone = ALONE;

@@ -74,4 +74,16 @@ char *bt_file_join(const char *dir, const char *name);
 /// The folder that a path is in, "." for a bare name, in new memory; the caller frees it.
 char *bt_file_folder(const char *path);
 
+// --- locks -----------------------------------------------------------------------------------------------------------
+
+// One process at a time in a result folder.
+
+/// Take dir/run.lock, which names host and process; the system lifts it when the process ends, however. Returns a
+/// descriptor for bt_lock_drop, −1 with a message when another process has it or it cannot be made. *busy: another
+/// process has it, which passes; or NULL.
+int bt_lock_take(const char *dir, bool *busy, bt_errors *err);
+/// The same of another file than run.lock, which tells of a run. It stays.
+int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *err);
+void bt_lock_drop(const char *dir, int lock);
+
 #endif

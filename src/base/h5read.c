@@ -172,20 +172,6 @@ static char *read_or_not(char *text, bool read)
     return NULL;
 }
 
-char *bt_h5_read_text(bt_h5_reader *r, const char *name)
-{
-    if (r->status != BT_OK) return NULL;
-    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), type = d < 0 ? -1 : H5Dget_type(d),
-                space = d < 0 ? -1 : H5Dget_space(d);
-    char *text = room_for(type, space);
-    text = read_or_not(text, text && H5Dread(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) >= 0);
-    if (space >= 0) H5Sclose(space);
-    if (type >= 0) H5Tclose(type);
-    if (d >= 0) H5Dclose(d);
-    if (!text) fail(r, name);
-    return text;
-}
-
 char *bt_h5_read_word(bt_h5_reader *r, const char *name)
 {
     if (r->status != BT_OK || H5Aexists_by_name(r->file, "/", name, H5P_DEFAULT) <= 0) return NULL;

@@ -37,8 +37,6 @@ void bt_h5_fail(bt_h5_reader *r, const char *why);
 bool bt_h5_there(const bt_h5_reader *r, const char *name);
 /// Size of a dataset's dimension k, 0 = not so many.
 int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
-/// A text that bt_h5_write_text has written; the caller frees it, NULL after an error.
-char *bt_h5_read_text(bt_h5_reader *r, const char *name);
 /// An attribute of the root that bt_h5_attr_word has written; the caller frees it. NULL: there is none.
 char *bt_h5_read_word(bt_h5_reader *r, const char *name);
 /// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem:

@@ -5,7 +5,19 @@
 
 #include <hdf5.h>
 
+#include "bergtow/base.h"
 #include "bergtow/comm.h"
+
+// --- chunks ----------------------------------------------------------------------------------------------------------
+
+// A chunk of numbers, shuffled and deflated as HDF5's own filters would read it back.
+
+typedef struct bt_deflater bt_deflater;
+
+/// n numbers of `size` bytes each, and zeros up to `room` numbers, as one stream of zlib. Returns its bytes, which stay
+/// until the next call, and *length; NULL where zlib refuses. *d: NULL before the first call.
+const void *bt_deflate(bt_deflater **d, const void *numbers, size_t n, size_t room, size_t size, size_t *length);
+void bt_deflater_free(bt_deflater *d);
 
 /// An open file and its state. After a failure, and on a rank that has the file not open in HDF5, every function below
 /// does nothing, so that a sequence of writes needs one check at its end.
@@ -21,7 +33,7 @@ typedef struct bt_h5 {
 
 /// Create (truncate) a file that other programs may read while it is being written.
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
-/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5slab.h. Returns the same on
+/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5dataset.h. Returns the same on
 /// all ranks.
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err);
 /// Several ranks write into the file.

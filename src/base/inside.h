@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What all of the program uses of src/base/base.c and others have no use for.
-#ifndef BERGTOW_INSIDE_H
-#define BERGTOW_INSIDE_H
+#ifndef BT_INSIDE_H
+#define BT_INSIDE_H
 
 /// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
 /// parallel loop.
@@ -18,5 +18,25 @@ void bt_point_end(void *before);
 
 /// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));
+
+// Order of doubles for qsort.
+
+static inline int bt_ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// Functions in which the time goes, for the processor that there is. Their bits do not depend on it.
+
+// One copy of a function for each instruction set that the program is built for, chosen when it starts: by the dynamic
+// linker of glibc (ifunc), which other C libraries have nothing of.
+#if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&    \
+    !defined(__clang__) && defined(__GLIBC__)
+#define BT_FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
+#else
+#define BT_FOR_EACH_CPU
+#endif
+#define BT_INLINE static inline __attribute__((always_inline))
 
 #endif

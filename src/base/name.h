@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Names: of what a program adds (laws, shapes, quantities), and lists of names.
-#ifndef BERGTOW_NAME_H
-#define BERGTOW_NAME_H
+#ifndef BT_NAME_H
+#define BT_NAME_H
 
 #include "bergtow/base.h"
 
@@ -17,5 +17,19 @@ extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 
 /// The next of names with blanks between them, such as those of keys, cut to its room; false after the last.
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);
+
+// --- the closest word ------------------------------------------------------------------------------------------------
+
+// The known word closest to a mistyped one, for "did you mean".
+
+/// Edit distance with insertions, deletions, substitutions and swaps of neighbours (optimal string alignment).
+/// Words longer than 63 bytes, and those whose lengths alone put them `enough` or more apart, are at distance 64.
+int bt_suggest_distance(const char *a, const char *b, int enough);
+
+/// Largest distance at which a suggestion for this word still helps: a third of its length, at least 1.
+int bt_suggest_limit(const char *word);
+
+/// The entry of the NULL-terminated list closest to word, or NULL when none is near. Ties go to the first.
+const char *bt_suggest(const char *word, const char *const *list);
 
 #endif

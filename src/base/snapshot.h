@@ -69,7 +69,7 @@ typedef struct bt_state_row {
     bt_item_type type;
     int width;
     size_t offset;
-    const char *units, *meaning, *axes; ///< for a reader of the file; axes as in h5axes.h
+    const char *units, *meaning, *axes; ///< for a reader of the file; axes as in h5dataset.h
     bt_row_check check;                 ///< held when it is taken
 } bt_state_row;
 
@@ -119,7 +119,7 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// What an array without a row is, its units (NULL: it is text) and its axes, as in h5axes.h; NULL where that is not
+/// What an array without a row is, its units (NULL: it is text) and its axes, as in h5dataset.h; NULL where that is not
 /// known.
 typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "base/checksum.h"

@@ -29,7 +29,7 @@
 // parts the means of the two halves by three standard errors of their difference is seen in 89 to 92 %, 90 % in the
 // mean (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
-#include "base/ascending.h"
+#include "base/inside.h"
 #include "base/elementary.h"
 
 #include <math.h>

@@ -1,9 +1,26 @@
 // SPDX-License-Identifier: MIT
 // A YAML text as a tree of maps, lists and scalars with line numbers: the part of YAML that case files use.
-#ifndef BERGTOW_TREE_H
-#define BERGTOW_TREE_H
+#ifndef BT_TREE_H
+#define BT_TREE_H
+
+#include <stddef.h>
 
 #include "bergtow/base.h"
+
+// --- slips -----------------------------------------------------------------------------------------------------------
+
+// What a syntax error of YAML comes from, in the words of who wrote the file.
+
+/// An error as libyaml tells of it; lines count from 1.
+typedef struct bt_syntax {
+    const char *text; ///< the whole input, n bytes
+    size_t n;
+    const char *problem;
+    int line;  ///< of the problem
+    int begun; ///< line in which what could not be ended began, 0 = none
+} bt_syntax;
+
+enum { BT_SYNTAX_WHY = 240 };
 
 typedef enum { BT_NODE_SCALAR, BT_NODE_LIST, BT_NODE_MAP } bt_node_kind;
 

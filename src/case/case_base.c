@@ -39,7 +39,9 @@ static bool is_of_cases(const char *word)
     return !strcmp(word, "floes") || (strcmp(word, "report") && bt_schema_is_section(section));
 }
 
-bool bt_case_is_study(const bt_node *root)
+/// Does the file hold a study? A study and a case with a base both have the key `base`: it is a study if it has any
+/// other key of studies, or none of cases (`report` is of both).
+static bool case_is_study(const bt_node *root)
 {
     if (!bt_tree_has(root, "base")) return false;
     bool of_cases = false;
@@ -55,7 +57,7 @@ bool bt_case_is_study(const bt_node *root)
 bt_file_kind bt_case_kind(const bt_node *root)
 {
     if (!root || root->kind != BT_NODE_MAP) return BT_FILE_OTHER;
-    if (bt_case_is_study(root)) return BT_FILE_STUDY;
+    if (case_is_study(root)) return BT_FILE_STUDY;
     for (int i = 0; i < root->n; i++)
         if (is_of_cases(root->key[i])) return BT_FILE_CASE;
     return BT_FILE_OTHER;
@@ -96,7 +98,7 @@ static bt_status parse(bt_case_files *f, bt_errors *err)
         bt_errors_add(err,
                       "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
                       file->path, root->kind == BT_NODE_LIST ? "list" : "single text");
-    else if (bt_case_is_study(root))
+    else if (case_is_study(root))
         bt_errors_add(err,
                       "%s: is a study, by its key `base` and no key of a case; run it with `bergtow "
                       "ensemble`, look at it with `bergtow check`",

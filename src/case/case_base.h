@@ -30,10 +30,6 @@ void bt_case_files_free(bt_case_files *f);
 /// with "--- # FILE". Caller frees.
 char *bt_case_files_text(const bt_case_files *f);
 
-/// Does the file hold a study? A study and a case with a base both have the key `base`: it is a study if it has any
-/// other key of studies, or none of cases (`report` is of both).
-bool bt_case_is_study(const bt_node *root);
-
 /// What a file holds, by its keys; other where it cannot be read. Pipes, which can be read only once, are not read.
 typedef enum { BT_FILE_OTHER, BT_FILE_CASE, BT_FILE_STUDY } bt_file_kind;
 bt_file_kind bt_case_kind_of(const char *path);

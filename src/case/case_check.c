@@ -8,7 +8,6 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
-#include "case/case_frame.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"

@@ -1,9 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Numbers that follow from a case whose keys have their values; more of them are in bergtow/case.h.
-#ifndef BERGTOW_CASE_DERIVED_H
-#define BERGTOW_CASE_DERIVED_H
+#ifndef BT_CASE_DERIVED_H
+#define BT_CASE_DERIVED_H
 
 #include "bergtow/case.h"
+#include "bergtow/shape.h"
+
+// --- shapes of the body ----------------------------------------------------------------------------------------------
+
+// Names of the towed body's waterlines, in the order of bt_body_shape; those that a program adds follow.
+
+enum { BT_OWN_SHAPES = BT_BODY_ABSENT + 1 };
+
+extern const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1]; ///< ends with NULL
 
 /// Corners v [n][2] of an outline with its centroid at the origin. Returns n; 0, and names the fault in *why (or NULL),
 /// when there is no such outline.

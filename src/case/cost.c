@@ -84,7 +84,7 @@ double bt_cost_seconds(const bt_case *c)
 // --- memory ----------------------------------------------------------------------------------------------------------
 
 /// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel
-/// (panel_blocks.h).
+/// (panel.h).
 static double steps_kept(const bt_case *c)
 {
     const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;

@@ -2,6 +2,56 @@
 // The table of tow lines; see case/rope.h.
 #include "case/rope.h"
 
+#include <math.h>
+
+#include "bergtow/catenary.h"
+#include "base/elementary.h"
+
+// --- a line with weight ----------------------------------------------------------------------------------------------
+
+// The elastic catenary; equations in bergtow/catenary.h.
+
+enum { MOST_STEPS = 200 }; // of Newton's method, of which it takes fewer than 40
+
+double bt_catenary_span(double length, double stiffness, double weight, double pull)
+{
+    const double u = 0.5 * weight * length / pull;
+    return length * (bt_asinh(u) / u + pull / stiffness);
+}
+
+/// asinh(u)/u − 1/√(1+u²), which for small u is u²/3 − 3u⁴/10 + 15u⁶/56.
+static double slackness(double u)
+{
+    const double u2 = u * u;
+    if (u < 0.01) return u2 * (1.0 / 3 - u2 * (3.0 / 10 - u2 * (15.0 / 56)));
+    return bt_asinh(u) / u - 1 / sqrt(1 + u2);
+}
+
+// With the slope u as the unknown, the span's equation times u is g(u) = asinh(u) + e − (l/L) u = 0, e = w L/2EA:
+// concave, with g(0) = e > 0 and −∞ at infinity, so that it has one root, and Newton's method from any point on its
+// right falls to it without a step beyond, for every line and span. Such a point: asinh(u) ≤ √2 u/√(1+u), since the
+// derivative of asinh is at most √2/(1+u) and log(1+u) ≤ u/√(1+u); so g ≤ 0 where √(1+u) ≥ 2√2 L/l and u ≥ 2e L/l. And
+// of a line that is longer than unstretched asinh(u) ≤ u gives u ≤ e/(l/L − 1). It ends where rounding does not let it
+// fall further.
+double bt_catenary_pull(double length, double stiffness, double weight, double span, double *tangent)
+{
+    if (tangent) *tangent = 0;
+    if (!(span > 0)) return 0;
+    const double half = 0.5 * weight * length, e = half / stiffness, s = span / length;
+    double u = fmax(8 / (s * s), 2 * e / s);
+    if (s > 1) u = fmin(u, e / (s - 1));
+    for (int k = 0; k < MOST_STEPS; k++) {
+        const double next = u - (bt_asinh(u) + e - s * u) / (1 / sqrt(1 + u * u) - s);
+        if (!(next < u && next > 0)) break;
+        u = next;
+    }
+    const double pull = half / u;
+    if (tangent) *tangent = 1 / (length * (slackness(u) / pull + 1 / stiffness));
+    return pull;
+}
+
+// --- ropes by name ---------------------------------------------------------------------------------------------------
+
 static const struct {
     const char *name, *source;
     double mass_d2, breaking_d2, breaking_d3; // kg/m³, N/m², N/m³

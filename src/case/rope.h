@@ -7,8 +7,8 @@
 //   polypropylene  8-strand multiplait:   mass 452.6 d², EA 1.06e9 d²,   MBL 1.060e8 d²              [1]
 //   dyneema        HMPE:                  mass 496 d²,   EA 56 MBL,      MBL 5.80e8 d² + 6.51e8 d³   [2]
 // [1] Orcina, OrcaFlex manual, Rope/Wire. [2] MoorPy, property library, NREL.
-#ifndef BERGTOW_ROPE_H
-#define BERGTOW_ROPE_H
+#ifndef BT_ROPE_H
+#define BT_ROPE_H
 
 #include "bergtow/case.h"
 

@@ -17,8 +17,7 @@
 
 #include "base/largest.h"
 #include "base/name.h"
-#include "base/suggest.h"
-#include "case/body_shapes.h"
+#include "case/case_derived.h"
 #include "case/value.h"
 
 #include <math.h>

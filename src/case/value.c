@@ -3,7 +3,7 @@
 #include "case/value.h"
 
 #include "base/largest.h"
-#include "base/suggest.h"
+#include "base/name.h"
 
 #include <ctype.h>
 #include <errno.h>

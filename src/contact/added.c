@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "contact/row.h"
-#include "contact/work.h"
+#include "contact/law_pair.h"
 
 static const bt_contact_law *added[BT_MAX_ADDED_LAWS];
 static int n_added;

@@ -10,13 +10,12 @@
 // (tests/unit/test_contacts.c holds them against all pairs by brute force).
 //
 // Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame,
-// rounded up to a power of √2; at least the slop, at most 16 mean floe sizes (space/margin.h).
+// rounded up to a power of √2; at least the slop, at most 16 mean floe sizes (space/cells.h).
 #ifndef BERGTOW_CONTACTS_H
 #define BERGTOW_CONTACTS_H
 
 #include "body/bodies.h"
 #include "space/cells.h"
-#include "space/margin.h"
 
 /// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
 /// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.
@@ -58,5 +57,10 @@ double bt_contacts_overlap(bt_world *w);
 /// known of the pair from its last search, on return from this one, with which the result is the same; or NULL.
 bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *m, bt_axes *axes);
+
+/// Of the manifolds man [n], in the order of gids and parts, those of bodies that are not convex and of shores: points
+/// that another part of the same pair of bodies, or another piece of a shore with the same body, has as well are taken
+/// out. What has no point left has n_points = 0.
+void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n);
 
 #endif

@@ -8,7 +8,7 @@
 
 #include "contact/overlap.h"
 #include "contact/row.h"
-#include "contact/work.h"
+#include "contact/law_pair.h"
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01

@@ -22,7 +22,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
-#include "base/cpu.h"
+#include "base/inside.h"
 #include "space/cells.h"
 #include "space/shore.h"
 #include "base/elementary.h"

@@ -4,7 +4,7 @@
 
 #include "contact/pack.h"
 #include "contact/row.h"
-#include "geometry/sweep.h"
+#include "geometry/apart.h"
 #include "partition/domain.h"
 #include "space/phases.h"
 #include "space/shore.h"
@@ -24,7 +24,7 @@ static bool of_same_outlines(const bt_world *w, const bt_pair *p, const bt_conta
 }
 
 /// Do the bodies of contact u meet if they bear no load on each other, and all others as they do? All of their parts
-/// and pieces nearby count: where several touch at one place, one row stands for all (merge.c).
+/// and pieces nearby count: where several touch at one place, one row stands for all (detect.c).
 static bool meet_without(const bt_world *w, const bt_cell *t, const bt_contact *u)
 {
     const bt_bodies *b = &w->bodies;

@@ -5,7 +5,7 @@
 // those that pass beside each other, which it stops as a wall would. Which of the two a pair does is known when the
 // velocities are. So after a solve every row that bears load, of a pair that was more than the slop apart and bore none
 // in the step before, is held against the way of the two outlines relative to each other, turning included
-// (geometry/sweep.h), at the velocities that they have without the impulse of this row and with those of all others. A
+// (geometry/apart.h), at the velocities that they have without the impulse of this row and with those of all others. A
 // pair that stays more than the slop apart is released: no impulse, no friction, no row in the position projection.
 // Released pairs are held against the new velocities in the same way; one that meets has its row again, for the rest of
 // the step. The step is solved anew from the impulses that are there until nothing changes: then every row that bears

@@ -6,7 +6,7 @@
 
 #include "contact/overlap.h"
 #include "contact/row.h"
-#include "contact/work.h"
+#include "contact/law_pair.h"
 #include "base/elementary.h"
 #include "case/case_derived.h"
 

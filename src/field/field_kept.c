@@ -15,7 +15,7 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "bergtow/shape.h"
-#include "base/provenance.h"
+#include "base/h5dataset.h"
 #include "case/case_files.h"
 #include "case/value.h"
 

@@ -3,10 +3,10 @@
 #ifndef BT_FIELD_MAKE_H
 #define BT_FIELD_MAKE_H
 
-#include "case/size_law.h"
 #include "bergtow/field.h"
-#include "geometry/apart.h"
 #include "bergtow/shape.h"
+#include "case/size_law.h"
+#include "geometry/apart.h"
 
 /// A body that lies in the ice: convex, in domain coordinates.
 typedef struct bt_obstacle {

@@ -17,7 +17,7 @@
 #include "bergtow/world.h"
 #include "field/field_make.h"
 #include "force/forces.h"
-#include "base/ascending.h"
+#include "base/inside.h"
 #include "base/elementary.h"
 #include "base/rng.h"
 

@@ -35,8 +35,7 @@
 #include "base/largest.h"
 #include "field/map_crs.h"
 #include "field/map_features.h"
-#include "field/map_place.h"
-#include "base/suggest.h"
+#include "base/name.h"
 
 static const double DEGREE = BT_PI / 180;
 

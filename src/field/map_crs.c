@@ -11,14 +11,15 @@
 // a metre long. Codes: EPSG registry.
 #include "field/map_crs.h"
 
-#include "bergtow/base.h"
-#include "base/elementary.h"
-
 #include <ctype.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+#include "bergtow/base.h"
+#include "base/elementary.h"
 
 static const double EARTH = 6371e3; // m, mean radius
 #define UPS_LATITUDE 81.1145 // deg, at which 0.994 at the pole has become 1
@@ -110,4 +111,19 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
         *along = sqrt(1 - half * half);
         *across = 1 / *along;
     }
+}
+
+// --- places ----------------------------------------------------------------------------------------------------------
+
+// Where x = y = 0 of a case lies on the earth: map_crs.h.
+
+bt_map_place bt_map_place_of(const bt_outline_counts *o, const bt_case *c)
+{
+    const bool read = o && o->read;
+    const bool plane = read && isfinite(o->east);
+    if (read && isfinite(o->lon)) return (bt_map_place){BT_MAP_DEGREES, o->lon, o->lat, NULL};
+    if (read && bt_map_crs_of(o->crs).kind == BT_MAP_PLANE)
+        return (bt_map_place){BT_MAP_PLANE, plane ? o->east : 0, plane ? o->north : 0, o->crs};
+    if (!isnan(c->ice.origin_lon)) return (bt_map_place){BT_MAP_DEGREES, c->ice.origin_lon, c->ice.origin_lat, NULL};
+    return (bt_map_place){BT_MAP_LOCAL, plane ? o->east : 0, plane ? o->north : 0, NULL};
 }

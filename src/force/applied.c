@@ -12,7 +12,7 @@
 
 #include "bergtow/forces.h"
 #include "base/name.h"
-#include "force/added.h"
+#include "force/forces.h"
 #include "force/load.h"
 #include "partition/domain.h"
 

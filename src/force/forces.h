@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The forces of a world in a step; laws and equations: bergtow/forces.h.
-#ifndef BERGTOW_FORCE_STEP_H
-#define BERGTOW_FORCE_STEP_H
+#ifndef BT_FORCES_H
+#define BT_FORCES_H
 
 #include "bergtow/forces.h"
 
@@ -32,5 +32,13 @@ bool bt_forces_rest(const bt_world *w);
 /// Velocity after a step of the free drift of a body without outline, whose form drag is part of its skin drag.
 /// b: par, time and towed_at are set here.
 bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
+
+// Force laws that a program has added, as checkpoints know them.
+
+/// An applied force (bergtow/applied.h) that does nothing in the step of these numbers; false of every other law.
+bool bt_force_waits(const bt_force_law *law, const double *own);
+
+/// An applied force whose function has been taken away: it acts no more.
+bool bt_force_is_released(const bt_force_law *law);
 
 #endif

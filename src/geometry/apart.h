@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // How far two convex polygons are apart. Independent of the contact code, so that it can check it.
-#ifndef BERGTOW_APART_H
-#define BERGTOW_APART_H
+#ifndef BT_APART_H
+#define BT_APART_H
+
+#include <stdbool.h>
 
 /// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
 typedef struct bt_apart {
@@ -14,5 +16,22 @@ typedef struct bt_apart {
 
 /// a [na][2], b [nb][2] relative to their centroids, (dx, dy) from the centroid of a to that of b.
 bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx, double dy);
+
+// --- motion ----------------------------------------------------------------------------------------------------------
+
+// Do two convex polygons come near each other as they move and turn?
+
+/// A convex polygon that moves: n vertices v [n][2] relative to the point it turns about, m; velocity x, y, m/s; rate
+/// of turn, rad/s.
+typedef struct bt_moving {
+    int n;
+    const double *v;
+    double x, y, rate;
+} bt_moving;
+
+/// Does the distance between a and b fall to `near`, m, or below within the time dt, s? (dx, dy): from the point that a
+/// turns about to that of b at the beginning, m. Never false when it does; true, too, for some that pass at little more
+/// than `near` (1 % on a straight way).
+bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy, double near, double dt);
 
 #endif

@@ -29,16 +29,16 @@
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then, without the rebound
 // In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
 //
-// What is counted of them, and from when: src/output/impact_count.h, src/loads/panel_blocks.h.
+// What is counted of them, and from when: src/output/impact_count.h, src/loads/panel.h.
 //
 // On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all
 // that follows.
-#ifndef BERGTOW_IMPACT_H
-#define BERGTOW_IMPACT_H
+#ifndef BT_IMPACT_H
+#define BT_IMPACT_H
 
 #include "bergtow/case.h"
-#include "loads/panel.h"
 #include "bergtow/world.h"
+#include "loads/panel.h"
 
 /// One manifold on the towed body in one step. Numbers only, so that ranks can hand it on as a row.
 typedef struct bt_body_contact {
@@ -119,7 +119,6 @@ void bt_impacts_take(bt_world *w);
 
 /// The run is over: what is still open is closed as it is, into `closed`.
 void bt_impacts_end(bt_impacts *m);
-
 
 /// What the conversion is, in words: "half-sine of 0.1 s".
 void bt_impact_describe(const bt_impact_rule *r, char out[160]);

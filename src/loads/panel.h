@@ -5,8 +5,8 @@
 // the body's x axis leaves it, so that a tow along that axis presses on panel 0 and its neighbours. A contact point
 // belongs to the panel of the nearest point of the waterline. The load of a step is impulse / Δt, whatever the contact
 // was: a quasi-static load, a collision, or both. Vectors are in the body's frame.
-#ifndef BERGTOW_PANEL_H
-#define BERGTOW_PANEL_H
+#ifndef BT_PANEL_H
+#define BT_PANEL_H
 
 #include "bergtow/base.h"
 
@@ -40,5 +40,46 @@ void bt_panels_clear(bt_panels *p);
 
 /// A normal force (N) and the force vector (N, body frame) at a point.
 void bt_panels_load(bt_panels *p, double x, double y, double normal, double fx, double fy);
+
+// --- blocks of steps -------------------------------------------------------------------------------------------------
+
+// Panel loads over a window whose start is known only when the run ends (private to the recorder).
+//
+//     | early steps: block 0 | block 1 | block 2 | ...        the window begins with one of the blocks 1, 2, ...
+//     0                   earliest
+//
+// From the earliest start on the steps are summed up in blocks as long as the possible starts lie apart
+// (bergtow/stats.h): 5 steps in a run of up to 20,480. When there would be more than BT_STATS_STARTS, two and two
+// become one. Memory, and share of a checkpoint: at most 4097 × 32 B a panel, 4.7 MB for 36. Rejected: all steps (1.2
+// kB each, without a bound); a sum that begins anew when the start that is found moves, which it also does backwards.
+
+/// Loads of several steps on one panel. Numbers only: a row of the checkpoint.
+typedef struct bt_panel_loads {
+    double fx, fy, normal; ///< sums over the steps, N
+    double most;           ///< largest normal of a step, N
+} bt_panel_loads;
+
+typedef struct bt_panel_blocks {
+    int n;                 ///< panels
+    int64_t steps;         ///< counted from the earliest start on
+    bt_panel_loads *load;  ///< [blocks][n]
+    int64_t cap;           ///< blocks there is room for
+} bt_panel_blocks;
+
+void bt_panel_blocks_init(bt_panel_blocks *b, int n);
+void bt_panel_blocks_free(bt_panel_blocks *b);
+
+/// Rows of `load` after so many steps: a row a panel for each block, the early one included.
+int64_t bt_panel_blocks_rows(const bt_panel_blocks *b, int64_t steps);
+
+/// Take the loads of a step. early: it ends before the earliest start.
+void bt_panel_blocks_add(bt_panel_blocks *b, const bt_panel *panel, bool early);
+
+/// What was saved: `steps`, and load[bt_panel_blocks_rows], which is taken over.
+void bt_panel_blocks_restore(bt_panel_blocks *b, int64_t steps, bt_panel_loads *load);
+
+/// Into before[n] and within[n]: the steps before and in the window that begins `first` steps after the earliest start.
+/// first: a multiple of bt_stats_start_step(steps), or `steps`, where there is no window.
+void bt_panel_blocks_reduce(const bt_panel_blocks *b, int64_t first, bt_panel_loads *before, bt_panel_loads *within);
 
 #endif

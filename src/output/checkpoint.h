@@ -56,7 +56,7 @@
 //                     - contact, closed, collision, largest_quasi_static_load, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way
 //                     in result.h5: the entries and frames themselves
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
+//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel.h)
 //                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
 //                     D the rest
@@ -67,8 +67,8 @@
 //
 // That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c).
 // What no step can leave is refused, under a sound checksum too (src/output/state_check.c).
-#ifndef BERGTOW_CHECKPOINT_H
-#define BERGTOW_CHECKPOINT_H
+#ifndef BT_CHECKPOINT_H
+#define BT_CHECKPOINT_H
 
 #include "bergtow/base.h"
 
@@ -104,5 +104,12 @@ bt_status bt_checkpoint_print(const char *path, bt_errors *err);
 /// Compare two checkpoints; *difference: the first, in words, NULL = none. The caller frees it. Errors as for
 /// bt_checkpoint_read: a difference is none.
 bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference, bt_errors *err);
+
+// --- units and axes of what is saved ---------------------------------------------------------------------------------
+
+// What those arrays of a checkpoint are that no row of a saved member describes, for readers of the file.
+
+/// Meaning of an array "group/name", its units (NULL: it is text) and axes; NULL where it has none.
+const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes);
 
 #endif

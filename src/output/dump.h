@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The contact problem of the step just solved, in a file.
-#ifndef BERGTOW_DUMP_H
-#define BERGTOW_DUMP_H
+#ifndef BT_DUMP_H
+#define BT_DUMP_H
 
 #include "bergtow/world.h"
 

@@ -4,7 +4,7 @@
 #define BT_ESTIMATE_TEXT_H
 
 #include "bergtow/estimate.h"
-#include "output/json_keys.h"
+#include "base/json.h"
 
 extern const bt_json_key bt_estimate_keys[]; ///< of one estimate
 extern const int bt_n_estimate_keys;

@@ -12,7 +12,7 @@
 #include "bergtow/shape.h"
 #include "output/xdmf.h"
 #include "base/elementary.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 

@@ -3,9 +3,9 @@
 #ifndef BT_FRAMES_H
 #define BT_FRAMES_H
 
-#include "output/map_axes.h"
+#include "output/xdmf.h"
 #include "output/record.h"
-#include "base/h5slab.h"
+#include "base/h5dataset.h"
 
 typedef struct bt_frames {
     bt_h5 *h;

@@ -10,6 +10,7 @@
 #ifndef BT_IMPACT_COUNT_H
 #define BT_IMPACT_COUNT_H
 
+#include "base/json.h"
 #include "loads/impact.h"
 #include "output/history.h"
 #include "output/steady.h"
@@ -47,5 +48,14 @@ void bt_impact_count_add(bt_impact_count *c, const bt_impact *e);
 
 /// The largest peaks kept, into peaks[n_peaks], largest first.
 void bt_impact_count_peaks(const bt_impact_count *c, double *peaks);
+
+// --- in the summary --------------------------------------------------------------------------------------------------
+
+// Collisions and quasi-static loads in the summary (private to it).
+
+/// An array of ranks, each with its peak and how often that is reached or exceeded.
+void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c);
+/// Two lines of the printed table; nothing when c is NULL. at_least: the loads are lower bounds.
+void bt_impacts_print(const bt_impact_count *c, bool at_least);
 
 #endif

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 
 #define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
 #define PIECE 8192 // rows that are read back at once

@@ -8,7 +8,7 @@
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/impact_count.h"
-#include "loads/panel_blocks.h"
+#include "loads/panel.h"
 #include "base/snapshot.h"
 
 enum { BT_IMPACT_COLUMNS = 13 };

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "step/splitting.h"
 
 /// A column of the splits. Times and rows of floes are made of the history, the others are in it.

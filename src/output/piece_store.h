@@ -13,10 +13,9 @@
 
 #include "base/h5read.h"
 #include "base/h5util.h"
-#include "output/map_axes.h"
+#include "output/xdmf.h"
 #include "output/record.h"
 #include "output/roster.h"
-#include "output/xdmf.h"
 
 struct bt_splitting;
 

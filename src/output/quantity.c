@@ -1,45 +1,243 @@
 // SPDX-License-Identifier: MIT
-// All quantities: the program's own table (record_series.c), then what has been registered (quantity_registry.c), those
+// All quantities: the program's own table (record_series.c), then what has been registered (quantity.c), those
 // of force laws and contact laws included: their tables may grow, and are looked at before anybody counts.
 #include "bergtow/quantity.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/contact.h"
+#include "bergtow/forces.h"
 #include "base/name.h"
-#include "output/contact_quantities.h"
-#include "output/force_quantities.h"
-#include "output/quantity_registry.h"
+#include "contact/law.h"
 #include "output/record.h"
 
-int bt_n_program_series(void) { return bt_n_own_series + bt_n_law_series(); }
+// --- what has been registered ----------------------------------------------------------------------------------------
+
+// What has been registered beside the program's own quantities.
+
+const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
+const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};
+const char *const bt_applies_codes[BT_APPLIES_KINDS] = {
+    [BT_APPLIES_ALWAYS] = "always", [BT_APPLIES_BODY] = "body",       [BT_APPLIES_LINE] = "line",
+    [BT_APPLIES_BRIDLE] = "bridle", [BT_APPLIES_VESSEL] = "vessel",   [BT_APPLIES_IMPACTS] = "impacts",
+    [BT_APPLIES_WINDOW] = "moving",
+};
+const char *const bt_applies_names[BT_APPLIES_KINDS] = {
+    [BT_APPLIES_ALWAYS] = "always",
+    [BT_APPLIES_BODY] = "with a towed body",
+    [BT_APPLIES_LINE] = "with a tow line",
+    [BT_APPLIES_BRIDLE] = "with a tow line of two branches",
+    [BT_APPLIES_VESSEL] = "with a vessel",
+    [BT_APPLIES_IMPACTS] = "where collisions are told apart",
+    [BT_APPLIES_WINDOW] = "with a moving window",
+};
+
+enum { MOST_NAME = 48, MOST_KEY = 80 }; // of the 40 letters that a force law may have, _force makes 46
+static bt_quantity added[BT_MAX_ADDED];
+static char added_keys[BT_MAX_ADDED][MOST_KEY];
+static int n_added;
+
+static bool is_taken(const char *name)
+{
+    for (int k = 0; k < bt_n_own_series; k++)
+        if (!strcmp(bt_own_series[k].name, name)) return true;
+    for (int law = 0; law < BT_LAWS; law++)
+        for (int k = 0; k < bt_laws[law]->n_numbers; k++)
+            if (!strcmp(bt_laws[law]->numbers[k].name, name)) return true;
+    for (int k = 0; k < n_added; k++)
+        if (!strcmp(added[k].name, name)) return true;
+    return false;
+}
+
+/// mean_NAME_n for a mean in N: the units as the other keys of summary.json end with them.
+static void make_key(const bt_quantity *q, char key[MOST_KEY])
+{
+    int n = snprintf(key, MOST_KEY, "%s_%s", bt_keep_names[q->keep], q->name);
+    if (!strcmp(q->units, "1")) return;
+    if (n + 1 < MOST_KEY) key[n++] = '_';
+    for (const char *u = q->units; *u && n + 1 < MOST_KEY; u++)
+        key[n++] = isalnum((unsigned char)*u) ? (char)tolower((unsigned char)*u) : '_';
+    key[n] = '\0';
+}
+
+/// A name without underscores; kept to the end of the program, as the texts of a quantity are.
+static char *in_words(const char *name)
+{
+    char *words = bt_text_copy(name);
+    for (char *p = words; *p; p++)
+        if (*p == '_') *p = ' ';
+    return words;
+}
+
+/// Why there can be no series of this name, or not `more` of them, into err.
+static void registry_check(const char *name, int more, bt_errors *err)
+{
+    if (!bt_is_name(name, MOST_NAME))
+        bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
+                      MOST_NAME);
+    else if (is_taken(name))
+        bt_errors_add(err, "quantity %s: there is a series of this name; choose another", name);
+    if (n_added + more > BT_MAX_ADDED)
+        bt_errors_add(err, "quantity %s: a program can add %d of them, and they are all there; take the name of a "
+                      "force whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
+}
+
+bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
+{
+    const size_t before = err->n;
+    const char *name = q->name ? q->name : "";
+    registry_check(name, 1, err);
+    if (!q->units || !*q->units)
+        bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
+    if (!q->description || strlen(q->description) < 8)
+        bt_errors_add(err, "quantity %s: say in a sentence what it is (`description`)", name);
+    if (!q->of_world == !q->of_floe) bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
+    if ((unsigned)q->keep >= BT_KEEP_KINDS || (unsigned)q->applies >= BT_APPLIES_KINDS ||
+        (unsigned)q->role >= BT_ROLE_KINDS)
+        bt_errors_add(err, "quantity %s: keep, applies or role is none of its kinds", name);
+    if (err->n > before) return BT_ERR_USAGE;
+    bt_quantity *own = &added[n_added];
+    *own = *q;
+    make_key(q, added_keys[n_added]);
+    own->summary = added_keys[n_added];
+    if (!own->label) own->label = in_words(own->name);
+    own->offset = offsetof(bt_sample, added) + (size_t)n_added * sizeof(double);
+    n_added++;
+    return BT_OK;
+}
+
+// --- of force laws ---------------------------------------------------------------------------------------------------
+
+/// Is its force one of the program's own series?
+static bool has_series(const bt_force_series *of)
+{
+    for (int k = 0; k < bt_n_own_series; k++)
+        if (bt_own_series[k].of_world == bt_force_of && !strcmp(bt_own_series[k].context, of->name)) return true;
+    return false;
+}
+
+/// Its texts stay for the life of the program, as the law does.
+static void add_quantity(const bt_force_series *of)
+{
+    bt_errors err = {0};
+    char *name = bt_text_of("%s_force", of->name),
+         *text = bt_text_of("%s on the towed body against the tow direction", of->law ? of->law->doc : of->name);
+    const bt_quantity q = {.name = name, .units = "N", .description = text, .label = of->name, .keep = BT_KEEP_MEAN,
+                           .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE, .of_world = bt_force_of,
+                           .context = of->name};
+    if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);
+    bt_errors_free(&err);
+}
+
+/// Register a quantity for each series of the table of force laws that is none of the program's own series, once.
+static void force_quantities(void)
+{
+    static int known; // series of the table that have been looked at
+    for (; known < bt_n_force_series; known++) {
+        const bt_force_series *of = &bt_force_series_of[known];
+        if (!of->part && !has_series(of)) add_quantity(of);
+    }
+}
+
+// --- of contact laws -------------------------------------------------------------------------------------------------
+
+static bt_quantity own[BT_MAX_LAW_NUMBERS];
+
+static double own_number(const bt_world *w, const void *quantity)
+{
+    return w->stats.laws[(const bt_quantity *)quantity - own];
+}
+
+/// Those of the program's own, in the order of the laws.
+static int n_law_series(void)
+{
+    static int n; // asked for every quantity of every step
+    if (n == 0) n = bt_law_first_number(BT_LAWS);
+    return n;
+}
+
+static const bt_quantity *law_series(int k)
+{
+    for (int law = 0, i = 0; !own[k].name && law < BT_LAWS; law++)
+        for (int j = 0; j < bt_laws[law]->n_numbers; j++, i++) {
+            const bt_law_number *n = &bt_laws[law]->numbers[j];
+            own[i] = (bt_quantity){.name = n->name, .units = n->units, .description = n->description, .keep = n->keep,
+                                   .applies = BT_APPLIES_ALWAYS, .summary = n->key, .of_world = own_number,
+                                   .context = &own[i],
+                                   .offset = offsetof(bt_sample, laws) + (size_t)i * sizeof(double)};
+        }
+    return &own[k];
+}
+
+static double number(const bt_world *w, const void *place)
+{
+    return ((const double *)w->stats.added)[*(const int *)place];
+}
+
+/// Its texts stay for the life of the program, as the law does.
+static void add_number(const bt_quantity *like, int law, int k)
+{
+    static int place[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS];
+    place[law][k] = law * (1 + BT_MAX_CONTACT_NUMBERS) + k;
+    bt_errors err = {0};
+    bt_quantity q = *like;
+    q.applies = BT_APPLIES_ALWAYS, q.role = BT_ROLE_NONE, q.of_world = number, q.context = &place[law][k];
+    if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);
+    bt_errors_free(&err);
+}
+
+static void add_law(int law)
+{
+    const bt_contact_law *l = bt_contact_law_of(law);
+    char *name = bt_text_of("%s_work", l->name),
+         *text = bt_text_of("work taken by contact points at their bound: %s", l->doc);
+    add_number(&(bt_quantity){.name = name, .units = "J", .description = text, .keep = BT_KEEP_SUM}, law, 0);
+    for (int k = 0; k < l->n_numbers; k++) {
+        const bt_contact_number *n = &l->numbers[k];
+        add_number(&(bt_quantity){.name = n->name, .units = n->units, .description = n->description,
+                                  .keep = n->state ? BT_KEEP_LAST : BT_KEEP_SUM}, law, 1 + k);
+    }
+}
+
+/// Register a quantity for each number of the added laws, once.
+static void contact_quantities(void)
+{
+    static int known;
+    for (; known < bt_n_contact_laws(); known++) add_law(known);
+}
+
+// --- all of them -----------------------------------------------------------------------------------------------------
+
+int bt_n_program_series(void) { return bt_n_own_series + n_law_series(); }
 int bt_n_series(void) { return bt_n_program_series() + bt_n_added(); }
 
 const bt_quantity *bt_series(int k)
 {
-    const int before = bt_n_own_series - BT_SERIES_AFTER_LAWS, laws = bt_n_law_series();
+    const int before = bt_n_own_series - BT_SERIES_AFTER_LAWS, laws = n_law_series();
     if (k < before) return &bt_own_series[k];
-    if (k < before + laws) return bt_law_series(k - before);
-    return k < bt_n_program_series() ? &bt_own_series[k - laws] : bt_registered(k - bt_n_program_series());
+    if (k < before + laws) return law_series(k - before);
+    return k < bt_n_program_series() ? &bt_own_series[k - laws] : &added[k - bt_n_program_series()];
 }
 
 int bt_n_added(void)
 {
-    bt_force_quantities();
-    bt_contact_quantities();
-    return bt_n_registered();
+    force_quantities();
+    contact_quantities();
+    return n_added;
 }
 
-const bt_quantity *bt_added(int k) { return bt_registered(k); }
+const bt_quantity *bt_added(int k) { return &added[k]; }
 
 /// For a law that is about to be registered, whose series are taken up when they are asked for first.
 static bool may_be(const char *name, int more, bt_errors *err)
 {
     const size_t before = err->n;
     bt_n_added(); // those of the laws before it
-    bt_registry_check(name, more, err);
+    registry_check(name, more, err);
     return err->n == before;
 }
 

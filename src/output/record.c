@@ -17,14 +17,13 @@
 
 #include "output/checkpoint.h"
 #include "base/fileio.h"
-#include "base/provenance.h"
+#include "base/h5dataset.h"
 #include "case/case_files.h"
 #include "output/folder.h"
 #include "output/record_parts.h"
 #include "output/summary_keys.h"
 #include "base/checksum.h"
 #include "output/xdmf.h"
-#include "base/h5axes.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
 // The same at a frame, or so many of them. Not at each: one append a series takes some milliseconds, a quarter of the

@@ -113,7 +113,7 @@ static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double valu
 /// has: bit 1 << k for each bt_applies k of the run.
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
 
-/// The contact forces of a step in which the load of the towed body has no bound (solve/locked.h) become NaN. The tow
+/// The contact forces of a step in which the load of the towed body has no bound (solve/islands.h) become NaN. The tow
 /// force is one of them at a prescribed speed, and stays a number on a line.
 void bt_sample_lose_load(bt_sample *s, bool prescribed);
 
@@ -226,7 +226,7 @@ bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, co
 bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
                            const bt_record_bodies *b, const char *command_line, bt_errors *err);
 
-/// After either: the identity of the run (record_run.c) goes to the file, and to the checkpoints of this record.
+/// After either: the identity of the run (record_resume.c) goes to the file, and to the checkpoints of this record.
 /// identity: on rank 0. The status is that of rank 0: agree on it.
 bt_status bt_record_identify(bt_record *r, const char *identity, bt_errors *err);
 

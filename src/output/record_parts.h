@@ -21,7 +21,7 @@ struct bt_record {
     char *dir;
     const bt_case *c;
     const bt_comm *comm;
-    char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_run.c)
+    char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_resume.c)
     bool fresh;            ///< a new run, in place of what the folder held
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
@@ -70,16 +70,6 @@ static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 }
 
 #define BT_RECORD_IDENTITY "about/run" // in a checkpoint
-
-/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
-/// the first n entries x of series k.
-void bt_record_check_run(bt_snapshot *s, bt_h5_reader *old);
-void bt_record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
-                            bt_h5_reader *old);
-
-/// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
-/// of it. Errors: BT_ERR_IO.
-bt_status bt_record_keep_case(const bt_record *r, bt_errors *err);
 
 /// A text file of the folder.
 bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err);

@@ -11,12 +11,135 @@
 // Rejected: to cut the file under way back to the checkpoint's counts, which has to be readable for that; a file of its
 // own for each piece between two checkpoints, which every reader would have to join.
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fileio.h"
-#include "output/record_parts.h"
 #include "base/checksum.h"
+#include "base/fileio.h"
+#include "case/case_files.h"
+#include "output/record_parts.h"
+
+// --- of the same run -------------------------------------------------------------------------------------------------
+
+// Is the result in a folder of the run that a checkpoint is of? A checkpoint that was kept while another run took the
+// folder, or comes from another folder, would go on in a result whose beginning is not its own.
+//
+// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Runs
+// that began alike may have been led apart by a program; and so the series, too, are compared with the history that
+// the checkpoint keeps of every step.
+
+#define CASE_FILE "case.resolved.yml"
+#define IDENTITY "run" // attribute of the root
+
+bt_status bt_record_identify(bt_record *r, const char *identity, bt_errors *err)
+{
+    if (r->comm->rank != 0) return BT_OK;
+    r->h5.err = err;
+    snprintf(r->identity, sizeof r->identity, "%s", identity);
+    bt_h5_attr_word(&r->h5, "/", IDENTITY, r->identity);
+    return r->h5.status;
+}
+
+/// Does a text say the same of every key? Tables that it names are those that the case has: no file is read.
+static bool same_values(const bt_case *c, const char *text)
+{
+    bt_case other;
+    bt_errors unheard = {0};
+    const bool read = bt_case_read_kept(&other, c->path ? c->path : CASE_FILE, text, &c->water.table, &c->air.table,
+                                        &unheard) == BT_OK;
+    char *mine = bt_case_resolved(c), *its = read ? bt_case_resolved(&other) : NULL;
+    const bool same = !strcmp(text, mine) || (its && !strcmp(its, mine));
+    free(mine);
+    free(its);
+    bt_case_free(&other);
+    bt_errors_free(&unheard);
+    return same;
+}
+
+static void refuse(bt_h5_reader *old, const bt_snapshot *s, const char *why)
+{
+    if (old->status != BT_OK) return;
+    bt_errors_add(old->err,
+                  "%s: is of another run than %s: %s; restore the result of that run, or go on from a checkpoint of "
+                  "this one",
+                  old->path, s->path, why);
+    old->status = BT_ERR_CASE;
+}
+
+/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
+/// the first n entries x of series k.
+static void record_check_run(bt_snapshot *s, bt_h5_reader *old)
+{
+    char *its = bt_h5_read_word(old, IDENTITY);
+    if (strcmp(its ? its : "", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)
+        refuse(old, s, "it began with another case or other ice");
+    free(its);
+}
+
+/// Of step j = 0, 1, ... of an entry, and of all of them: as bt_record_sample makes it.
+static double entry_of(bt_keep keep, const double *step, int64_t every)
+{
+    double m = step[0];
+    for (int64_t j = 1; j < every; j++) m = bt_record_merge(keep, m, step[j]);
+    return bt_record_merged(keep, m, every);
+}
+
+static void record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
+                                bt_h5_reader *old)
+{
+    static const struct {
+        const char *name;
+        bt_column column;
+    } kept[] = {{"time", BT_COL_TIME}, {"ice_resistance", BT_COL_ICE}, {"tow_force", BT_COL_TOW},
+                {"residual", BT_COL_RESIDUAL}}; // also of ice that has not met the body
+    const bt_quantity *q = bt_series(k);
+    const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
+    for (size_t j = 0; j < sizeof kept / sizeof *kept; j++) {
+        if (strcmp(kept[j].name, q->name) != 0) continue;
+        for (int64_t i = 0; i < n && old->status == BT_OK; i++) {
+            const double entry = entry_of(q->keep, r->history.column[kept[j].column] + i * every, every);
+            if (entry == x[i] || (isnan(entry) && isnan(x[i]))) continue;
+            const bool lost = entry_of(BT_KEEP_MAX, r->history.column[BT_COL_NO_LOAD] + i * every, every) > 0;
+            if (lost && isnan(x[i])) continue;
+            char *why = bt_text_of("/series/%s is %.17g in entry %lld, where the run had %.17g", q->name, x[i],
+                                   (long long)i, entry);
+            refuse(old, s, why);
+            free(why);
+        }
+    }
+}
+
+/// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
+/// of it. Errors: BT_ERR_IO.
+static bt_status record_keep_case(const bt_record *r, bt_errors *err)
+{
+    char *path = bt_file_join(r->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(r->c);
+    size_t size = 0;
+    bt_errors unheard = {0}, warnings = {0};
+    const bool read = bt_file_read(path, "a case", &text, &size, &unheard) == BT_OK;
+    char *digests = read ? bt_case_digests_in(r->c, text) : NULL, *wanted = bt_case_with_digests(resolved, digests);
+    bt_status status = BT_OK;
+    if (!read || strcmp(text, wanted) != 0) {
+        if (!read || !same_values(r->c, text)) // otherwise its comments have been edited
+            bt_errors_add(&warnings,
+                          "warning: %s: was not the case that the run began with; it is written anew, by the "
+                          "checkpoint",
+                          path);
+        status = bt_record_write_text(r, CASE_FILE, wanted, err);
+    }
+    if (status == BT_OK) bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
+    bt_errors_free(&unheard);
+    free(text);
+    free(resolved);
+    free(digests);
+    free(wanted);
+    free(path);
+    return status;
+}
+
+// --- what was recorded -----------------------------------------------------------------------------------------------
 
 /// By name: a program that goes on may have its series in another order.
 static const char *merged_name(int k, char name[BT_HISTORY_NAME])
@@ -149,7 +272,7 @@ static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, i
         if (may_lack(k) && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = 0;
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
-        if (old->status == BT_OK) bt_record_check_series(r, k, x, n, s, old);
+        if (old->status == BT_OK) record_check_series(r, k, x, n, s, old);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
@@ -263,7 +386,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     if (first) {
         load_history(&r->history, s, step);
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
-        if (!s->faulty && old.status == BT_OK) bt_record_check_run(s, &old);
+        if (!s->faulty && old.status == BT_OK) record_check_run(s, &old);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) load_series(r, s, &old, entries);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
@@ -276,7 +399,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     bt_h5_end(&old);
     if (status == BT_OK && first) bt_record_flush(r);
     if (status == BT_OK) status = r->h5.status;
-    if (status == BT_OK && first) status = bt_record_keep_case(r, err);
+    if (status == BT_OK && first) status = record_keep_case(r, err);
     if (status == BT_OK && first) status = bt_record_remove(r, "summary.json", err); // of an end that is none any more
     free(path);
     return bt_comm_agree(r->comm, status);

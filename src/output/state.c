@@ -11,7 +11,7 @@
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
-#include "force/added.h"
+#include "force/forces.h"
 #include "force/laws.h"
 #include "loads/impact.h"
 #include "space/cells.h"
@@ -21,7 +21,7 @@
 #include "partition/domain.h"
 #include "output/state_check.h"
 
-/// A member that is saved: where it is, what it is for a reader of the file (h5axes.h), and what must be true of it by
+/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it by
 /// itself. What members must be to each other: state_check.c.
 #define MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
     {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_}

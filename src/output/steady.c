@@ -13,7 +13,7 @@
 #include "case/case_check.h"
 #include "case/track.h"
 #include "case/warning.h"
-#include "base/ascending.h"
+#include "base/inside.h"
 #include "base/elementary.h"
 #include "output/summary.h"
 

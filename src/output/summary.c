@@ -7,22 +7,74 @@
 // and the same mean by momentum, without the contacts of the body (observe.c). The peak of step means depends on Δt:
 // the mean does not.
 #include "output/summary.h"
-#include "case/warning.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/elementary.h"
+#include "base/inside.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
+#include "case/warning.h"
 #include "estimate/packing.h"
 #include "geometry/path.h"
-#include "output/summary_window.h"
-#include "base/ascending.h"
-#include "base/elementary.h"
-#include "solve/locked.h"
+#include "solve/islands.h"
 #include "step/splitting.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+// --- the moving window -----------------------------------------------------------------------------------------------
+
+// What the moving window did, and when its ice is not that of a long domain.
+
+#define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is reported
+
+void bt_summary_window_print(const bt_window *v)
+{
+    if (!v) return;
+    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept, %lld places missed, %lld floes "
+           "wait\n",
+           bt_window_laps(v), (long long)v->renewed, (long long)v->kept, (long long)v->missed, (long long)v->waiting);
+}
+
+void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
+{
+    if (!(laps > 1)) return;
+    bt_warn(warnings, BT_WARN_WINDOW_LAPS,
+            "the moving window goes %.2f times its length through the ice: the body meets the same field "
+            "again after each, with the hole in which it stood at time zero; samples a length apart are not "
+            "independent, and the standard error may be too small; take a longer domain, or several values of "
+            "ice.seed",
+            laps);
+}
+
+static void summary_window_warn(bt_errors *warnings, const bt_window *v)
+{
+    if (!v) return;
+    const double places = (double)(v->renewed + v->missed),
+                 floes = (double)(v->renewed + v->kept);
+    if (v->overtaken > v->stride)
+        bt_warn(warnings, BT_WARN_ICE_OVERTOOK,
+                "ice overtook the body, which fell %.3g m back through it: wind, current or tide carried the ice "
+                "faster than the tow, and what came from behind was the ice of the window once more, which is "
+                "renewed ahead only; set domain.ends: periodic or open, or tow faster",
+                v->overtaken);
+    bt_summary_window_warn_laps(warnings, bt_window_laps(v));
+    if (places > 0 && (double)v->missed > SHARE_LIMIT * places)
+        bt_warn(warnings, BT_WARN_PLACES_MISSED,
+                "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
+                "along, or pushes them far ahead; the ice that it meets is thinner by that; take a longer domain",
+                100 * (double)v->missed / places);
+    if (floes > 0 && (double)v->kept > SHARE_LIMIT * floes)
+        bt_warn(warnings, BT_WARN_FLOES_KEPT,
+                "%.1f %% of the floes behind the moving window came back ahead as they were, their places not being "
+                "free: disturbed ice enters; take a longer domain, and more of it behind the body",
+                100 * (double)v->kept / floes);
+}
+
+// --- the numbers of a run --------------------------------------------------------------------------------------------
 
 #define CLOSURE_LIMIT 1e-6
 #define MOMENTUM_LIMIT 1e-9
@@ -233,7 +285,7 @@ static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c,
     bt_field_size_warn(c, &t->sizes, &s->warnings);
     if (t->mean_thickness > 0) bt_ice_warn(c, t->mean_size, t->mean_thickness, &s->warnings);
     warn_of_events(s, t->events);
-    bt_summary_window_warn(&s->warnings, t->window);
+    summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_warn(&s->warnings, BT_WARN_FLOES_LEFT,
                 "%lld floes left the open domain and resist no more; use a larger domain or walls if that "

@@ -4,10 +4,11 @@
 #define BT_SUMMARY_H
 
 #include "bergtow/estimate.h"
+#include "bergtow/stats.h"
 #include "case/arch.h"
 #include "output/record.h"
-#include "bergtow/stats.h"
 #include "output/steady.h"
+#include "step/window.h"
 
 enum { BT_EVENTS_REPORTED = 40 }; ///< one by one; all are in result.h5
 
@@ -42,5 +43,13 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
 /// Mean ice resistance that estimates are held against, N; NaN where the body met no ice in the window.
 double bt_summary_held_against(const bt_summary *s);
 void bt_summary_free(bt_summary *s);
+
+// --- the moving window -----------------------------------------------------------------------------------------------
+
+// The moving window in the summary: table, warnings. Nothing where there is none (NULL).
+
+void bt_summary_window_print(const bt_window *v);
+/// Of a moving window that goes, or is to go, so many times its length through the ice.
+void bt_summary_window_warn_laps(bt_errors *warnings, double laps);
 
 #endif

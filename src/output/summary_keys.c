@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "output/estimate_text.h"
-#include "output/impact_report.h"
+#include "output/impact_count.h"
 #include "case/warning.h"
 #include "contact/raft.h"
 #include "step/splitting.h"

@@ -3,7 +3,7 @@
 #ifndef BT_SUMMARY_KEYS_H
 #define BT_SUMMARY_KEYS_H
 
-#include "output/json_keys.h"
+#include "base/json.h"
 #include "output/summary.h"
 
 /// What a summary is made of.

@@ -8,9 +8,8 @@
 
 #include "output/estimate_text.h"
 #include "base/units.h"
-#include "output/impact_report.h"
+#include "output/impact_count.h"
 #include "output/summary.h"
-#include "output/summary_window.h"
 #include "step/splitting.h"
 #include "case/case_derived.h"
 #include "case/warning.h"

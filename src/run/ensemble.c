@@ -16,15 +16,12 @@
 #include "output/checkpoint.h"
 #include "field/field_kept.h"
 #include "bergtow/run.h"
-#include "run/ensemble_folder.h"
-#include "run/ensemble_journal.h"
 #include "run/ensemble_list.h"
 #include "run/ensemble_member.h"
 #include "run/halt.h"
-#include "run/study_axes.h"
+#include "run/study.h"
 #include "base/fileio.h"
-#include "base/launcher.h"
-#include "base/lock.h"
+#include "base/process.h"
 
 // Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
 #define GATHER_SECONDS 1.0

@@ -16,7 +16,7 @@
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
 //     /events/member, time, kind, subject, value [E]     as /events of result.h5 has them, kind by its name; no group
 //                                                        without one
-//     /warnings, /reasons, /codes                        ensemble_notes.h
+//     /warnings, /reasons, /codes                        ensemble_record.h
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members,
 //                                                        n_finished, n_failed
 //
@@ -34,11 +34,10 @@
 
 #include "bergtow/ensemble.h"
 #include "bergtow/event.h"
-#include "run/ensemble_notes.h"
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/h5axes.h"
+#include "base/h5dataset.h"
 #include "case/schema.h"
 #include "base/checksum.h"
 #include "bergtow/quantity.h"

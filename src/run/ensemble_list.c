@@ -3,22 +3,127 @@
 #include "run/ensemble_list.h"
 
 #include <fcntl.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
-#include "base/lock.h"
+#include "base/fileio.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
 #include "field/field_kept.h"
-#include "run/ensemble_journal.h"
+#include "output/checkpoint.h"
 #include "run/ensemble_member.h"
+#include "run/study.h"
+
+// --- the journal -----------------------------------------------------------------------------------------------------
+
+// The journal of an ensemble; reasons in bergtow/ensemble.h.
+
+#define JOURNAL "journal.jsonl"
+
+/// Add a line, in one write: lines of several processes do not mix. wall: s, NAN = not known. A line that cannot be
+/// written is left out.
+static void journal_add(const char *dir, const char *event, const char *member, double wall, int code)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    char line[256], took[32] = "null";
+    if (isfinite(wall)) snprintf(took, sizeof took, "%.3f", wall);
+    const int n = snprintf(line, sizeof line,
+                           "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
+                           "%s, \"exit_code\": %d}\n",
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, member, (long)getpid(), took, code);
+    const int fd = bt_member_open(dir, JOURNAL, O_WRONLY | O_CREAT | O_APPEND);
+    if (fd < 0) return;
+    if (write(fd, line, (size_t)n) == n) fsync(fd);
+    close(fd);
+}
+
+void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *lacking)
+{
+    bool *ended = bt_alloc((size_t)n, sizeof *ended);
+    // Line by line: a journal may be longer than the texts that bt_file_read takes.
+    const int fd = bt_member_open(dir, JOURNAL, O_RDONLY);
+    FILE *f = fd < 0 ? NULL : fdopen(fd, "r");
+    char *line = NULL;
+    size_t room = 0;
+    while (f && getline(&line, &room, f) > 0) {
+        int64_t condition, repeat;
+        const char *name = strstr(line, "\"member\": \"c");
+        if (!name || sscanf(name, "\"member\": \"c%" SCNd64 "-r%" SCNd64, &condition, &repeat) != 2) continue;
+        const int64_t i = (condition - 1) * repeats + repeat - 1;
+        // with fewer repeats than before there are lines of members that are no longer asked for
+        if (i >= 0 && i < n && repeat >= 1 && repeat <= repeats)
+            ended[i] = strstr(line, "\"event\": \"finished\"") != NULL;
+    }
+    const bool whole = f && !ferror(f); // what cannot be read may say anything
+    for (int64_t i = 0; i < n; i++) lacking[i] = lacking[i] && whole && !ended[i];
+    free(line);
+    free(ended);
+    if (f) fclose(f);
+    else if (fd >= 0) close(fd);
+}
+
+// --- the folder ------------------------------------------------------------------------------------------------------
+
+/// The folder is of this study, or new; old: which of these. digest: of the text that the folder keeps, which may have
+/// the comments of another version of the program. The caller holds its lock.
+static bt_status keep_resolved(const char *dir, const char *text, bool *old, char digest[BT_DIGEST_TEXT],
+                               bt_errors *err)
+{
+    char *path = bt_file_join(dir, "study.resolved.yml"), *before = NULL;
+    size_t size;
+    *old = access(path, F_OK) == 0;
+    bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
+    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text)) {
+        bt_errors_add(err,
+                      "%s: holds the members of another study (see %s): only `repeats` may change; give another "
+                      "folder with -o, or restore the study and its base case",
+                      dir, path);
+        status = BT_ERR_CASE;
+    }
+    const char *kept = *old ? before : text;
+    if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
+    free(before);
+    free(path);
+    return status;
+}
+
+bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_options *o, char digest[BT_DIGEST_TEXT],
+                                     bt_errors *err)
+{
+    char *text = bt_study_resolved(s, err);
+    if (!text) return BT_ERR_CASE;
+    char *members = bt_file_join(o->dir, "members"), *copy = bt_file_join(o->dir, "study.yml");
+    bt_study_files files;
+    bt_errors warnings = {0};
+    bool old = false;
+    bt_study_files_find(&files, s);
+    bt_status status = bt_file_make_dir(members, err);
+    const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
+    if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
+    if (status == BT_OK) status = keep_resolved(o->dir, text, &old, digest, err);
+    if (status == BT_OK) status = bt_study_files_keep(&files, o->dir, old, &warnings, err);
+    if (status == BT_OK) status = bt_file_write(copy, s->text, err);
+    if (fd >= 0) close(fd);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
+    bt_study_files_free(&files);
+    free(members);
+    free(copy);
+    free(text);
+    return status;
+}
+
+// --- the list --------------------------------------------------------------------------------------------------------
 
 void bt_ensemble_journal(const bt_ensemble *e, const char *event, const bt_member *m, double wall, int code)
 {
-    bt_journal_add(e->o->dir, event, m->name, wall, code);
+    journal_add(e->o->dir, event, m->name, wall, code);
 }
 
 bool bt_entry_is_suspect(const bt_entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }
@@ -184,4 +289,133 @@ void bt_ensemble_count_settled(bt_ensemble *e)
         e->before++;
         e->cost_before += e->list[i].cost;
     }
+}
+
+// --- the report ------------------------------------------------------------------------------------------------------
+
+// What an ensemble prints while it works and at its end.
+
+/// The wall time that is left, s; infinite where none was given.
+double bt_ensemble_wall_left(const bt_ensemble *e)
+{
+    return e->o->max_wall > 0 ? e->o->max_wall - (bt_clock() - e->began) : INFINITY;
+}
+
+void bt_ensemble_say(const bt_ensemble *e, const bt_entry *x, bt_status status, double wall)
+{
+    if (e->o->quiet) return;
+    int64_t done = 0;
+    double cost = 0, all = 0;
+    for (int64_t i = 0; i < e->n; i++) {
+        bt_entry_look(&e->list[i]);
+        all += e->list[i].cost;
+        if (!e->list[i].settled) continue;
+        done++;
+        cost += e->list[i].cost;
+    }
+    const double passed = bt_clock() - e->began, spent = cost - e->cost_before,
+                 left = spent > 0 ? passed * (all - cost) / spent : NAN;
+    char line[512];
+    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name,
+                     status == BT_OK ? "finished" : "FAILED", wall);
+    for (int p = 0; p < e->s->n_parameters && n < 400; p++)
+        n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
+    if (isfinite(left) && done < e->n)
+        snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left",
+                 left < 120 ? left : left / 60);
+    printf("%s\n", line);
+    fflush(stdout);
+}
+
+typedef struct {
+    int64_t finished, failed, left, at_work, unsound;
+} counts;
+
+/// One member's part in the end: counted, and reported where it is a hole.
+static bt_status tell_member(bt_ensemble *e, const bt_entry *x, counts *n, bt_errors *err)
+{
+    int code;
+    char *why;
+    bt_errors damage = {0};
+    bt_status status = BT_OK;
+    const bt_member_state state = bt_ensemble_state(x->folder, &code, &why);
+    const bt_status sound = state == BT_MEMBER_FINISHED
+                                ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage)
+                                : BT_OK;
+    if (sound != BT_OK) {
+        if (n->unsound++ < BT_MOST_REPORTED)
+            bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0],
+                          sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
+        status = BT_ERR_IO;
+    } else if (state == BT_MEMBER_FINISHED) {
+        n->finished++;
+        if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
+    } else if (state == BT_MEMBER_FAILED) {
+        if (why) why[strcspn(why, "\n")] = 0;
+        if (n->failed++ < BT_MOST_REPORTED)
+            bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
+        status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
+    } else {
+        n->left++;
+        n->at_work += x->busy || bt_member_held(x->folder);
+    }
+    free(why);
+    bt_errors_free(&damage);
+    return status;
+}
+
+static int by_index(const void *a, const void *b)
+{
+    return ((const bt_entry *)a)->index < ((const bt_entry *)b)->index ? -1 : 1;
+}
+
+/// What members warn of: of each code the text of the first, and how many others there are.
+static void report_warnings(const bt_ensemble *e)
+{
+    const bt_member_notes *w = &e->warnings;
+    for (int64_t i = 0; i < w->n; i++) {
+        int64_t others = 0, last = w->member[i];
+        bool first = true;
+        for (int64_t k = 0; k < i && first; k++) first = strcmp(w->code[k], w->code[i]) != 0;
+        for (int64_t k = i + 1; k < w->n && first; k++)
+            if (w->member[k] != last && !strcmp(w->code[k], w->code[i])) others++, last = w->member[k];
+        if (!first) continue;
+        printf("  warning: %s (%s", w->text[i], e->list[w->member[i] - 1].m.name);
+        if (others) printf("; and %" PRId64 " more", others);
+        printf(")\n");
+    }
+}
+
+bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
+{
+    counts n = {0};
+    bt_status worst = status;
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_index);
+    for (int64_t i = 0; i < e->n; i++) {
+        const bt_status of = tell_member(e, &e->list[i], &n, err);
+        if (worst == BT_OK) worst = of;
+    }
+    if (n.failed > BT_MOST_REPORTED)
+        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt",
+                      n.failed - BT_MOST_REPORTED, e->o->dir);
+    if (n.unsound > BT_MOST_REPORTED)
+        bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - BT_MOST_REPORTED);
+    if (status == BT_ERR_SIGNAL)
+        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
+                      bt_ensemble_wall_left(e) <= 0 ? "the limit of wall time" : "a signal", n.left);
+    else if (n.at_work)
+        bt_errors_add(err,
+                      "%" PRId64 " members are being worked on by other processes; the same call takes them in when "
+                      "those have ended",
+                      n.at_work);
+    else if (n.left && worst == BT_OK)
+        bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
+    if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
+    if (!e->o->quiet) {
+        printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
+        if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
+        printf("; %s/ensemble.h5\n", e->o->dir);
+        report_warnings(e);
+    }
+    return worst;
 }

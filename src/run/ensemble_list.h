@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What a call of an ensemble knows of its members, and what it says of them; private to src/run/ensemble*.c.
-#ifndef BERGTOW_ENSEMBLE_LIST_H
-#define BERGTOW_ENSEMBLE_LIST_H
+#ifndef BT_ENSEMBLE_LIST_H
+#define BT_ENSEMBLE_LIST_H
 
+#include "bergtow/base.h"
 #include "bergtow/ensemble.h"
 #include "run/ensemble_record.h"
-#include "run/study_files.h"
+#include "run/study.h"
 
 enum { BT_MOST_REPORTED = 10 }; ///< failed members that are reported one by one
 
@@ -36,7 +37,7 @@ typedef struct bt_ensemble {
     char *fields;       ///< folder of the fields that members share
     int64_t fixed;      ///< conditions whose ice does not depend on the seed
     int n_groups, of_group, threads, jobs;
-    int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/lock.h)
+    int lock, run_lock; ///< held for the member at hand: among ensembles, and as that of any run (base/fileio.h)
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded
@@ -74,5 +75,22 @@ void bt_ensemble_say(const bt_ensemble *e, const bt_entry *x, bt_status status, 
 /// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no
 /// hole.
 bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err);
+
+// --- the journal -----------------------------------------------------------------------------------------------------
+
+// journal.jsonl in the folder of an ensemble: a line for each start and end of a member.
+
+/// lacking [n], by the place of a member in a study of so many repeats: set to false for those whose last line says
+/// that they have finished, and for all where there is no journal, or where it cannot be read.
+void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *lacking);
+
+// --- the folder ------------------------------------------------------------------------------------------------------
+
+// The folder of an ensemble: which study it holds, and the files that this is made of.
+
+/// Make the folder with its resolved study and the files that the study names. BT_ERR_CASE: it is of another study, or
+/// a file has changed. digest: of the resolved study that the folder keeps. By one process of a call.
+bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_options *o, char digest[BT_DIGEST_TEXT],
+                                     bt_errors *err);
 
 #endif

@@ -11,7 +11,7 @@
 #include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
-#include "solve/locked.h"
+#include "solve/islands.h"
 #include "space/cells.h"
 #include "partition/domain.h"
 #include "output/state.h"

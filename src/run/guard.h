@@ -5,7 +5,7 @@
 //     guard.overlap       deepest overlap of two bodies / mean floe size
 //     guard.energy        kinetic energy of all bodies / the energy that the scene can drive them to
 //     guard.unconverged   steps in a row that met the limit of work
-//     guard.no_solution   steps in which bodies cannot give way to any load (solve/locked.h) / steps of the case
+//     guard.no_solution   steps in which bodies cannot give way to any load (solve/islands.h) / steps of the case
 //     guard.escape        a body whose centroid is beyond a wall
 // and, always, NaN or infinity, or a number where there must be NaN: in poses and velocities, in tow, window and
 // collisions, in what the series take (bt_sample_fault). 0 or false switches the others off. The limits are assumed:

@@ -20,7 +20,7 @@
 #include "output/dump.h"
 #include "output/observe.h"
 #include "solve/batch.h"
-#include "solve/locked.h"
+#include "solve/islands.h"
 #include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
@@ -29,11 +29,10 @@
 #include "case/cost.h"
 #include "field/field_kept.h"
 #include "partition/domain.h"
-#include "base/cores.h"
+#include "base/process.h"
 #include "base/fileio.h"
 #include "output/folder.h"
 #include "output/gather.h"
-#include "base/lock.h"
 #include "run/run_parts.h"
 
 typedef bt_running run;

@@ -24,7 +24,6 @@
 #include "case/case_check.h"
 #include "case/case_derived.h"
 #include "case/ice_bounds.h"
-#include "run/setup_tow.h"
 #include "base/elementary.h"
 
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // From a case and its ice field to a world.
-#ifndef BERGTOW_SETUP_H
-#define BERGTOW_SETUP_H
+#ifndef BT_SETUP_H
+#define BT_SETUP_H
 
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"
 #include "case/track.h"
 #include "output/roster.h"
+#include "tow/tow.h"
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
 /// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
@@ -27,5 +28,13 @@ void bt_setup_track_free(bt_track *t);
 
 /// Constants of the step from the case. size: mean floe size, m.
 bt_params bt_setup_params(const bt_case *c, double size);
+
+// The tow of a case (private to the set-up).
+
+/// The tow at time zero of a case that was checked; release with bt_tow_free.
+bt_tow *bt_setup_tow(const bt_case *c);
+
+/// Displacement from the start after this way of the tow, m.
+void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double way, double d[2]);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Builds the tow of a case: programme, path, branches, vessel.
-#include "run/setup_tow.h"
+#include "run/setup.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The files that the cases of a study name; reasons in study_files.h.
-#include "run/study_files.h"
+// The files that the cases of a study name; reasons in study.h.
+#include "run/study.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,7 +13,6 @@
 #include "case/case_check.h"
 #include "case/case_files.h"
 #include "case/value.h"
-#include "run/study_axes.h"
 
 /// Take over a path. A file that cannot be read is left out.
 static void add(bt_study_files *f, char *path)

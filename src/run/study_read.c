@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Reading of a study file.
-#include "run/study_values.h"
+#include "run/study.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -9,11 +9,10 @@
 
 #include "base/fileio.h"
 #include "base/largest.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
 #include "case/value.h"
-#include "run/study_axes.h"
 
 /// Members write no frames unless the study sets this: what it says comes later, and counts.
 static const char no_frames[] = "output.frame_interval=-1 s";

@@ -11,10 +11,10 @@
 #include "base/inside.h"
 #include "base/largest.h"
 #include "base/rng.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "case/schema.h"
 #include "case/value.h"
-#include "run/study_values.h"
+#include "run/study.h"
 
 void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...)
 {

@@ -37,14 +37,29 @@
 // reported beside it. Under a bound the map is bounded, too, by L W: an impulse that is short of it by more than 1 %
 // counts by the speed that it leaves (bt_short_residual in src/solve/kernel.h); of sheets, whose impulse has a
 // direction, one that takes 1 % less power than the bound allows.
-#ifndef BERGTOW_SOLVER_H
-#define BERGTOW_SOLVER_H
+#ifndef BT_SOLVER_H
+#define BT_SOLVER_H
 
+#include "bergtow/world.h"
 #include "contact/contacts.h"
-#include "contact/work.h"
+#include "contact/law_pair.h"
 #include "space/cells.h"
 #include "tow/tow.h"
-#include "bergtow/world.h"
+
+// --- restitution -----------------------------------------------------------------------------------------------------
+
+// Restitution that never adds energy (private to the solver).
+//
+// Newton's law can add energy when several contacts of a body rebound at once, or slip (Kane & Levinson 1985). Movable
+// bodies that touch form an island; where the contacts of an island come out with positive work, the step is solved
+// again with the restitution of that island halved, and again, at last with none, where the work is never positive.
+
+/// Collective. Full restitution for every island; false (and nothing to do) when no contact of this step has any.
+bool bt_restitution_begin(bt_world *w);
+
+/// Collective. Lower the restitution, and the biases, of every island whose contacts did positive work, beyond what
+/// rows solved to the residual may do (λ times the residual, and rounding). True when there was one.
+bool bt_restitution_lower(bt_world *w);
 
 /// A contact that has other rows for a moment (src/solve/project.c).
 typedef struct bt_kept_rows {

@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-#include "base/cpu.h"
+#include "base/inside.h"
 #include "bergtow/base.h"
 
 enum { BT_LANES = 4 };

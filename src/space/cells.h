@@ -33,14 +33,26 @@
 // forces have changed, labels are new) and leave it when they are none of these. Everything in the others is as it was,
 // and their part of every sum is zero. Floes that drift with moving water are moved in every step: then all cells are
 // busy.
-#ifndef BERGTOW_CELLS_H
-#define BERGTOW_CELLS_H
+#ifndef BT_CELLS_H
+#define BT_CELLS_H
 
 #include <math.h>
 #include <stdint.h>
 
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
+
+// --- the margin ------------------------------------------------------------------------------------------------------
+
+// How far apart bodies may be and still meet within the step.
+
+/// A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun), m: a solution
+/// that flies apart must not ask for cells, and pair lists, of the whole field.
+double bt_margin_most(const bt_world *w);
+
+/// Margin for speed s: 2 Δt s, rounded up to a power of √2 so that pair lists stay valid while speeds wander; at least
+/// the slop. m
+double bt_margin_for(const bt_world *w, double s);
 
 /// the fifth phase is the cell of the large movable bodies
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };

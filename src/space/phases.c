@@ -12,7 +12,7 @@
 #include "space/exchange.h"
 #include "tow/tow.h"
 
-void bt_totals_merge(bt_totals *into, const bt_totals *from)
+static void totals_merge(bt_totals *into, const bt_totals *from)
 {
     for (int k = 0; k < into->n_sums; k++) bt_sum_join(&into->sum[k], &from->sum[k]);
     into->most = bt_max(into->most, from->most);
@@ -236,7 +236,7 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *t)
         mine.own = &own;
         run(&mine);
 #pragma omp critical
-        bt_totals_merge(t, &own);
+        totals_merge(t, &own);
     }
     o->w->stats.in_team += bt_clock() - t0;
 }

@@ -45,8 +45,6 @@ typedef struct bt_totals {
     double most, most2;
 } bt_totals;
 
-void bt_totals_merge(bt_totals *into, const bt_totals *from);
-
 /// Work on one cell. Only the bodies of its block, its contacts and *t may be changed.
 typedef void bt_visit(bt_world *w, bt_idx cell, const void *context, bt_totals *t);
 

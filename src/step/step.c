@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "contact/work.h"
+#include "contact/law_pair.h"
 #include "contact/contacts.h"
 #include "contact/passing.h"
 #include "contact/row.h"

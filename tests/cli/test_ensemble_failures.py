@@ -295,7 +295,7 @@ def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     prepare(tmp_path)
     assert ensemble(tmp_path, "--steps", 3).returncode == SIGNAL
     member = tmp_path / "all/members/c002-r001"
-    run_lock = open(member / "run.lock", "w")  # as src/base/lock.c has it
+    run_lock = open(member / "run.lock", "w")  # as src/base/fileio.c has it
     fcntl.flock(run_lock, fcntl.LOCK_EX)
     result = ensemble(tmp_path, "--no-wait")
     assert result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr, result

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rebounds with friction, many at once, give no energy: Newton's law alone would, and the coefficient is lowered where
-it does (solve/restitution.h)."""
+it does (solve/solver.h)."""
 import numpy as np
 import pytest
 

@@ -4,7 +4,7 @@
 #include "scene.h"
 
 #include "contact/pack.h"
-#include "geometry/sweep.h"
+#include "geometry/apart.h"
 
 enum { INSTANTS = 1500 };
 

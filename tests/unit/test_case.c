@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Case files: the table of keys, defaults, every error at once with its line, overrides.
 #include "base/largest.h"
-#include "base/suggest.h"
+#include "base/name.h"
 #include "bergtow/shape.h"
 #include "case/schema.h"
 #include "case/value.h"

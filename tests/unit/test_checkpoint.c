@@ -29,7 +29,6 @@
 #include "base/checksum.h"
 #include "base/snapshot.h"
 #include "snapshot_file.h"
-#include "output/checkpoint_names.h"
 #include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-checkpoint-XXXXXX";

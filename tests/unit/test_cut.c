@@ -14,7 +14,6 @@
 
 #include "bergtow/base.h"
 #include "partition/cut.h"
-#include "partition/cut_method.h"
 
 // A grid of nx × ny cells, neighbours right, up and right-up as in the sweep's 2 × 2 blocks.
 typedef struct grid {

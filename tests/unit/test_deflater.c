@@ -9,7 +9,7 @@
 #include <cmocka.h>
 #include <zlib.h>
 
-#include "base/deflater.h"
+#include "base/h5util.h"
 #include "base/rng.h"
 
 enum { N = 20000, ROOM = 20480 };

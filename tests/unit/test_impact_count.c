@@ -8,7 +8,7 @@
 #include "made_up_run.h"
 
 #include "output/impact_count.h"
-#include "loads/panel_blocks.h"
+#include "loads/panel.h"
 #include "base/snapshot.h"
 
 enum { PANELS = 3 };

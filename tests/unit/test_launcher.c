@@ -9,8 +9,7 @@
 // cmocka.h wants the headers above first
 #include <cmocka.h>
 
-#include "base/cores.h"
-#include "base/launcher.h"
+#include "base/process.h"
 
 extern char **environ;
 

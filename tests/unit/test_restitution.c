@@ -2,7 +2,7 @@
 // Which rebounds are lowered, and by how much, on contacts whose impulses and velocities are given.
 #include "all_pairs.h"
 
-#include "solve/restitution.h"
+#include "solve/solver.h"
 
 static bt_contact *contact_of(const bt_world *w, bt_gid a, bt_gid b)
 {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Work of the impulses of a contact.
-#ifndef BERGTOW_WORK_H
-#define BERGTOW_WORK_H
+#ifndef BT_LAW_PAIR_H
+#define BT_LAW_PAIR_H
 
 #include "space/cells.h"
 

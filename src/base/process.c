@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: MIT
+// What started this process, and the cores that it may use.
+#include "base/process.h"
+
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+// --- the launcher ----------------------------------------------------------------------------------------------------
+
+// What started this process, as its environment tells: a launcher of parallel programs, or not.
+//
+// MPI itself gives no answer before MPI_Init, and MPI_Init without a launcher takes half a second with Open MPI 4.1,
+// for nothing, at each call of the program. What a launcher sets is fixed by its process management interface: PMI 1
+// and 2 (Hydra of MPICH and Intel MPI, srun --mpi=pmi2, Cray), PMIx (PRRTE, srun --mpi=pmix), or its own names.
+// BERGTOW_MPI=yes helps where none of them is there.
+
+// In this order, for a launcher may itself have been started by another: mpirun within a job starts its servers with
+// srun, whose variables are then those of the servers.
+static const struct {
+    const char *rank, *size; ///< size: NULL where the launcher does not say it
+} kinds[] = {
+    {"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"}, // Open MPI
+    {"PMI_RANK", "PMI_SIZE"},                         // MPICH, Intel MPI, srun --mpi=pmi2
+    {"PMI_ID", NULL},                                 // PMI by port: rank and size come later
+    {"MV2_COMM_WORLD_RANK", "MV2_COMM_WORLD_SIZE"},   // MVAPICH2
+    {"JSM_NAMESPACE_RANK", "JSM_NAMESPACE_SIZE"},     // IBM jsrun
+    {"FLUX_TASK_RANK", "FLUX_JOB_SIZE"},              // Flux
+    {"PALS_RANKID", NULL},                            // HPE Cray PALS
+    {"ALPS_APP_PE", NULL},                            // Cray aprun
+    {"PMIX_RANK", NULL},                              // PMIx: the size is known to its server
+    {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS"},         // srun
+};
+enum { N_KINDS = sizeof kinds / sizeof *kinds };
+
+/// The whole number of a variable, −1 where there is none.
+static int number(const char *name)
+{
+    const char *text = name ? getenv(name) : NULL;
+    char *end = NULL;
+    const long n = text ? strtol(text, &end, 10) : -1;
+    return text && *text && !*end && n >= 0 && n <= INT32_MAX ? (int)n : -1;
+}
+
+bt_launcher bt_launcher_find(void)
+{
+    bt_launcher by = {0};
+    for (int i = 0; i < N_KINDS; i++) {
+        const int rank = number(kinds[i].rank), size = number(kinds[i].size);
+        if (rank < 0) continue;
+        if (i == N_KINDS - 1 && size < 2) continue; // a job script, or a step of one task
+        if (!by.found) by.first = rank == 0;
+        by.found = true;
+        if (size > 0) {
+            by.size = size;
+            break;
+        }
+    }
+    return by;
+}
+
+void bt_launcher_forget(void)
+{
+    for (int i = 0; i < N_KINDS; i++) {
+        unsetenv(kinds[i].rank);
+        if (kinds[i].size) unsetenv(kinds[i].size);
+    }
+}
+
+double bt_launcher_began(void)
+{
+    enum { BEFORE = 19 }; // fields of proc_pid_stat(5) behind the name, before starttime
+    char text[1024] = "";
+    FILE *f = fopen("/proc/self/stat", "r");
+    if (f && !fgets(text, sizeof text, f)) *text = '\0';
+    if (f) fclose(f);
+    const char *p = strrchr(text, ')'); // a name may hold anything
+    for (int k = 0; p && k <= BEFORE; k++) p = strchr(p + 1, ' ');
+    const double now = bt_clock(), ticks = p ? strtod(p, NULL) : 0;
+    struct timespec since_boot;
+    if (!(ticks > 0) || clock_gettime(CLOCK_BOOTTIME, &since_boot) != 0) return now;
+    const double age = (double)since_boot.tv_sec + 1e-9 * (double)since_boot.tv_nsec -
+                       ticks / (double)sysconf(_SC_CLK_TCK);
+    return now - bt_max(0, age);
+}
+
+// --- the cores -------------------------------------------------------------------------------------------------------
+
+// The cores that this process may use, and its part of those that several ranks share.
+//
+// A launcher binds each rank to cores of its own (mpirun --map-by slot:PE=4, srun -c 4 with task affinity), or gives
+// all ranks of a node the same ones (mpirun --bind-to none, a container, a job's cgroup). The number of cores of the
+// machine says nothing of either: a job may have a few of them.
+
+bool bt_cores_given(cpu_set_t *cores)
+{
+    // With OMP_PROC_BIND the runtime has bound this thread to one of the places by now. Without it libgomp knows no
+    // places, while clang's libomp has one: the cores as they were when it started.
+    const int n_places = omp_get_proc_bind() == omp_proc_bind_false ? 0 : omp_get_num_places();
+    if (n_places == 0) return sched_getaffinity(0, sizeof *cores, cores) == 0;
+    CPU_ZERO(cores);
+    for (int p = 0; p < n_places; p++) {
+        int ids[CPU_SETSIZE];
+        const int n = omp_get_place_num_procs(p);
+        if (n > CPU_SETSIZE) continue;
+        omp_get_place_proc_ids(p, ids);
+        for (int k = 0; k < n; k++) CPU_SET(ids[k], cores);
+    }
+    return CPU_COUNT(cores) > 0;
+}
+
+/// Of n sets, those of the ranks of a node: how much of the cores of set `mine` is for its rank.
+static double share_of(const cpu_set_t *sets, int n, int mine)
+{
+    double share = 0;
+    for (int core = 0; core < CPU_SETSIZE; core++) {
+        if (!CPU_ISSET(core, &sets[mine])) continue;
+        int users = 0;
+        for (int k = 0; k < n; k++) users += CPU_ISSET(core, &sets[k]) != 0;
+        share += 1.0 / users;
+    }
+    return share;
+}
+
+/// No more than Slurm has promised a task; without affinity or cgroups nothing else keeps to it.
+static int within_task(int n)
+{
+    const char *text = getenv("SLURM_CPUS_PER_TASK");
+    const int most = text ? atoi(text) : 0;
+    return most > 0 && n > most ? most : n > 1 ? n : 1;
+}
+
+int bt_cores_share(const bt_comm *c)
+{
+    cpu_set_t given;
+    if (!bt_cores_given(&given)) { // more cores than a set holds
+        CPU_ZERO(&given);
+        for (int k = 0; k < omp_get_num_procs() && k < CPU_SETSIZE; k++) CPU_SET(k, &given);
+    }
+    if (c->size == 1) return within_task(CPU_COUNT(&given));
+    MPI_Comm node;
+    int rank, n;
+    MPI_Comm_split_type(c->mpi, MPI_COMM_TYPE_SHARED, c->rank, MPI_INFO_NULL, &node);
+    MPI_Comm_rank(node, &rank);
+    MPI_Comm_size(node, &n);
+    cpu_set_t *sets = bt_alloc((size_t)n, sizeof *sets);
+    MPI_Allgather(&given, sizeof given, MPI_BYTE, sets, sizeof given, MPI_BYTE, node);
+    MPI_Comm_free(&node);
+    const double share = share_of(sets, n, rank);
+    free(sets);
+    return within_task((int)(share + 1e-9));
+}
