@@ -98,13 +98,21 @@ typedef struct {
     int at;             ///< the point that bears most
 } centre;
 
-/// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer one. One
-/// point bears on what it crushes, F/(p h), or on a point where nothing is crushed.
-static centre centre_of(const bt_world *w, const bt_contact *u)
+/// Is contact j the edge of floes that have rafted (contact/raft.h)?
+static bool is_raft_edge(const bt_world *w, const bt_cell *cell, bt_idx j)
 {
+    return bt_law_on(&w->par, BT_LAW_RAFTING) && cell->laws.limits[j].record[BT_LAW_RAFTING] >= 0;
+}
+
+/// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer end: that
+/// is the nearer point itself, and where floes have rafted a half of the way between the points beyond it. One point
+/// bears on what it crushes, F/(p h), or on a point where nothing is crushed.
+static centre centre_of(const bt_world *w, const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *u = &cell->contacts[j];
     const double total = u->ln[0] + u->ln[1], s0 = u->ln[0] / total, s1 = u->ln[1] / total;
     centre c = {.ran = s0 * u->ran[0] + s1 * u->ran[1], .rbn = s0 * u->rbn[0] + s1 * u->rbn[1], .at = s1 > s0};
-    if (u->n > 1) c.length = 2 * bt_min(s0, s1) * fabs(u->ran[1] - u->ran[0]);
+    if (u->n > 1) c.length = (2 * bt_min(s0, s1) + is_raft_edge(w, cell, j)) * fabs(u->ran[1] - u->ran[0]);
     const bt_bodies *b = &w->bodies;
     const double pressure = w->par.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE],
                  h = bt_max(b->thickness[u->a], b->thickness[u->b]);
@@ -141,7 +149,7 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     const double nx = u->nx, ny = u->ny, rho = u->lt / total;
     const bt_contact_corner corner =
         bt_contact_corner_of(b, u, part, cell->gaps[j].feature[c->at]);
-    const bool sharp = u->n == 1 || u->ln[1 - c->at] == 0;
+    const bool sharp = !is_raft_edge(w, cell, j) && (u->n == 1 || u->ln[1 - c->at] == 0);
     load_row r = {
         .floe = b->gid[i],
         .load = {.x = along * nx + across * ny, .y = along * ny - across * nx, .edge_x = -ny, .edge_y = nx,
@@ -181,7 +189,7 @@ static void add_cell(const bt_world *w, const bt_cell *cell, load_list *to)
         if (!(u->ln[0] + u->ln[1] > 0)) continue;
         const bool a = may_split(w, u->a), of_b = may_split(w, u->b);
         if (!a && !of_b) continue;
-        const centre c = centre_of(w, u);
+        const centre c = centre_of(w, cell, j);
         const bt_collision q = bt_collision_of(w, u);
         if (a) add_side(w, cell, j, &c, &q, false, to);
         if (of_b) add_side(w, cell, j, &c, &q, true, to);
@@ -543,7 +551,7 @@ static void book(bt_splitting *s, const bt_split_record *r)
     s->total.by_mode[r->mode]++;
     s->total.crack_length += length;
     s->total.work += bt_split_work(s->law.toughness, r->thickness, length);
-    s->now++;
+    s->total.steps += s->now++ == 0;
 }
 
 bool bt_splitting_step(bt_world *w, int round)
@@ -580,7 +588,6 @@ bool bt_splitting_step(bt_world *w, int round)
         s->total.too_old += (int64_t)bt_sum_value(&all.sum[N_TOO_OLD]);
         s->total.rafted += (int64_t)bt_sum_value(&all.sum[N_RAFTED]);
         s->total.largest_refused = bt_max(s->total.largest_refused, all.most);
-        s->total.steps += s->now > 0;
     }
     free(found.row);
     free(found.vertex);
