@@ -100,6 +100,14 @@ double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const b
     return bound(f, &o, loads->size, fabs(loads->torque), loads->opening, law, l);
 }
 
+double bt_split_borne(const bt_split_floe *f, const bt_split_law *law)
+{
+    const form o = form_of(f);
+    if (!(2 * o.radius >= law->least_width)) return INFINITY;
+    const double l = law->least_width; // the bound is linear in sizes and opening forces
+    return 1 / bt_max(bound(f, &o, 1, o.radius, 0, law, l), bound(f, &o, 0, 0, 1, law, l));
+}
+
 /// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
 static double width_of(int n, const double *v, double *aspect)
 {

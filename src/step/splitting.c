@@ -24,6 +24,8 @@ void bt_splitting_free(bt_splitting *s)
     free(s->split);
     free(s->begin);
     free(s->vertex);
+    free(s->sum);
+    free(s->borne);
     free(s);
 }
 
@@ -89,6 +91,21 @@ static bool may_split(const bt_world *w, bt_idx i)
 {
     const bt_bodies *b = &w->bodies;
     return b->motion[i] == BT_DYNAMIC && b->thickness[i] > 0 && b->gid[i] != w->towed;
+}
+
+/// Body i as the law sees it.
+static bt_split_floe floe_of(const bt_world *w, bt_idx i)
+{
+    const bt_splitting *s = w->splitting;
+    const bt_bodies *b = &w->bodies;
+    bt_split_floe f = {.n = bt_body_corners(b, i), .outline = b->outline + 2 * b->offset[i],
+                       .convex = bt_part_first(b, i) == 0, .thickness = b->thickness[i], .factor = 1};
+    if (s->modulus > 0) {
+        int64_t path;
+        const bt_gid ancestor = bt_splitting_ancestor(s, b->gid[i], &path);
+        f.factor = bt_split_scatter(s->seed, ancestor, path, s->modulus);
+    }
+    return f;
 }
 
 /// A contact with a normal impulse: where its pressure has its centre, and on what length it bears.
@@ -176,18 +193,54 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     add(to, &r);
 }
 
-static void add_cell(const bt_world *w, const bt_cell *cell, load_list *to)
+/// Upper bound of the forces that contact j puts on a floe, opening ones with them, N. No wedge opens more than a flat
+/// corner, of 2 μ in bt_split_wedge.
+static double most_of(const bt_world *w, const bt_contact *u)
+{
+    const bt_impact_rule *rule = &w->splitting->rule;
+    const double total = u->ln[0] + u->ln[1], force = (total + fabs(u->lt)) / w->par.dt;
+    if (rule->conversion != BT_IMPACT_NONE) {
+        const bt_collision q = bt_collision_of(w, u);
+        if (q.impulse > 0 && q.approach >= rule->least_speed) return INFINITY;
+    }
+    const bool pair = (u->n == 1 || u->ln[0] == 0 || u->ln[1] == 0) &&
+                      (bt_law_on(&w->par, BT_LAW_CRUSHING) || bt_law_on(&w->par, BT_LAW_RAFTING));
+    return pair ? force + total / w->par.dt / (2 * u->mu) : force;
+}
+
+/// What is done with the contacts of a cell.
+typedef enum {
+    SUM, ///< bounds of the loads on floes that this rank owns are added up, and the loads on others listed
+    LIST ///< loads on its own floes that are to be looked at are listed
+} pass;
+
+static bool is_mine(const bt_world *w, bt_idx i) { return !w->domain || bt_domain_owns(w, i); }
+
+/// For body i of a contact: is its load to be listed? In the first pass `most`, N, is added where it is not.
+static bool is_listed(bt_world *w, bt_idx i, pass what, double most)
+{
+    double *sum = &w->splitting->sum[i];
+    if (!is_mine(w, i)) return what == SUM;
+    if (what == LIST) return *sum > 0;
+#pragma omp atomic
+    *sum += most;
+    return false;
+}
+
+static void add_cell(bt_world *w, const bt_cell *cell, pass what, load_list *to)
 {
     const bt_bodies *b = &w->bodies;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         if (u->n == 0) {
-            add(to, &(load_row){.floe = b->gid[u->a]});
-            add(to, &(load_row){.floe = b->gid[u->b]});
+            if (is_listed(w, u->a, what, 0)) add(to, &(load_row){.floe = b->gid[u->a]});
+            if (is_listed(w, u->b, what, 0)) add(to, &(load_row){.floe = b->gid[u->b]});
             continue;
         }
         if (!(u->ln[0] + u->ln[1] > 0)) continue;
-        const bool a = may_split(w, u->a), of_b = may_split(w, u->b);
+        const double most = what == SUM ? most_of(w, u) : 0;
+        const bool a = may_split(w, u->a) && is_listed(w, u->a, what, most),
+                   of_b = may_split(w, u->b) && is_listed(w, u->b, what, most);
         if (!a && !of_b) continue;
         const centre c = centre_of(w, cell, j);
         const bt_collision q = bt_collision_of(w, u);
@@ -197,38 +250,81 @@ static void add_cell(const bt_world *w, const bt_cell *cell, load_list *to)
     for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
         const bt_memory *m = &cell->laws.memory[k];
         if (m->law != BT_LAW_RAFTING) continue;
-        add(to, &(load_row){.floe = m->a});
-        add(to, &(load_row){.floe = m->b});
+        for (int side = 0; side < 2; side++) {
+            const bt_idx i = bt_world_index(w, side ? m->b : m->a);
+            if (i < 0 ? what == SUM : is_listed(w, i, what, 0)) add(to, &(load_row){.floe = side ? m->b : m->a});
+        }
     }
 }
 
-/// Collective. Loads of the floes that this rank owns; of them, some may be found by others.
-static load_list collect(const bt_world *w)
+static void add_cells(bt_world *w, pass what, load_list *to)
 {
     const bt_cells *t = w->cells;
-    load_list all = {0}, foreign = {0};
 #pragma omp parallel if (BT_MANY(t->n_order, BT_FEW_CELLS))
     {
         load_list mine = {0};
 #pragma omp for schedule(dynamic, 16) nowait
-        for (bt_idx i = 0; i < t->n_order; i++) add_cell(w, &t->cell[t->order[i]], &mine);
+        for (bt_idx i = 0; i < t->n_order; i++) add_cell(w, &t->cell[t->order[i]], what, &mine);
 #pragma omp critical
-        for (size_t i = 0; i < mine.n; i++) {
-            const bt_idx k = bt_world_index(w, mine.row[i].floe);
-            add(k >= 0 && bt_domain_owns(w, k) ? &all : &foreign, &mine.row[i]);
-        }
+        for (size_t i = 0; i < mine.n; i++) add(to, &mine.row[i]);
         free(mine.row);
     }
+}
+
+/// Sum of forces that body i surely bears, N: of its outline, thickness and strength, which an id has for ever.
+static double borne_by(const bt_world *w, bt_idx i)
+{
+    bt_splitting *s = w->splitting;
+    double *borne = &s->borne[w->bodies.gid[i]];
+    if (*borne == 0) {
+        const bt_split_floe f = floe_of(w, i);
+        *borne = bt_split_borne(&f, &s->law);
+    }
+    return *borne;
+}
+
+/// Room for a sum of each body and for what each id bears.
+static void make_room(bt_splitting *s, const bt_bodies *b)
+{
+    if (s->cap_sum < b->n) {
+        free(s->sum);
+        s->sum = bt_alloc((size_t)(s->cap_sum = b->n + b->n / 4), sizeof *s->sum);
+    } else memset(s->sum, 0, (size_t)b->n * sizeof *s->sum);
+    if (s->cap_borne >= b->n_global) return;
+    s->borne = bt_realloc(s->borne, (size_t)b->n_global, sizeof *s->borne);
+    for (; s->cap_borne < b->n_global; s->cap_borne++) s->borne[s->cap_borne] = 0;
+}
+
+/// Collective. Loads of the floes that this rank owns, but for those of floes whose loads together are too small to
+/// split them, in nearly all steps nearly all. Contacts of a floe may be found by other ranks, which send its loads.
+static load_list collect(bt_world *w)
+{
+    bt_splitting *s = w->splitting;
+    const bt_bodies *b = &w->bodies;
+    make_room(s, b);
+    load_list all = {0}, foreign = {0}, came = {0};
+    add_cells(w, SUM, &foreign);
     if (w->domain) {
-        size_t n;
-        load_row *rows = bt_domain_gather_all(w, foreign.row, foreign.n, sizeof *rows, &n);
-        for (size_t i = 0; i < n; i++) {
-            const bt_idx k = bt_world_index(w, rows[i].floe);
-            if (k >= 0 && bt_domain_owns(w, k)) add(&all, &rows[i]);
+        came.row = bt_domain_gather_all(w, foreign.row, foreign.n, sizeof *foreign.row, &came.n);
+        for (size_t k = 0; k < came.n; k++) {
+            const bt_idx i = bt_world_index(w, came.row[k].floe);
+            const bt_floe_load *f = &came.row[k].load;
+            if (i >= 0 && bt_domain_owns(w, i)) s->sum[i] += f->collision ? INFINITY : bt_hypot(f->fx, f->fy) + f->opening;
         }
-        free(rows);
     }
     free(foreign.row);
+    bool any = false;
+#pragma omp parallel for reduction(|| : any) if (BT_MANY(b->n, 4096))
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (s->sum[i] > 0) s->sum[i] = s->sum[i] > (1 - 1e-9) * borne_by(w, i);
+        any = any || s->sum[i] > 0;
+    }
+    if (any) add_cells(w, LIST, &all);
+    for (size_t k = 0; k < came.n; k++) {
+        const bt_idx i = bt_world_index(w, came.row[k].floe);
+        if (i >= 0 && bt_domain_owns(w, i) && s->sum[i] > 0) add(&all, &came.row[k]);
+    }
+    free(came.row);
     return all;
 }
 
@@ -268,13 +364,7 @@ static judged judge(const bt_world *w, bt_idx i, load_row *row, size_t n)
         else load[n_loads++] = row[k].load;
     }
     const bt_gid gid = b->gid[i];
-    bt_split_floe f = {.n = bt_body_corners(b, i), .outline = b->outline + 2 * b->offset[i],
-                       .convex = bt_part_first(b, i) == 0, .thickness = b->thickness[i], .factor = 1};
-    if (s->modulus > 0) {
-        int64_t path;
-        const bt_gid ancestor = bt_splitting_ancestor(s, gid, &path);
-        f.factor = bt_split_scatter(s->seed, ancestor, path, s->modulus);
-    }
+    const bt_split_floe f = floe_of(w, i);
     const bool splits = n_loads > 0 && bt_split_find(&f, load, n_loads, &s->law, &out.best);
     if (load != few) free(load);
     if (splits) {
@@ -517,9 +607,10 @@ static bt_memory *change(bt_world *w, bt_memory *memory, int64_t *n, const void 
 enum { N_DEFERRED, N_TOO_SMALL, N_TOO_OLD, N_RAFTED, N_COUNTS };
 
 /// Floes that split by the loads of this solution: those of this rank. *most: largest ratio of one that cannot.
-static found_list find(const bt_world *w, bt_sum count[N_COUNTS], double *most)
+static found_list find(bt_world *w, bt_sum count[N_COUNTS], double *most)
 {
     load_list loads = collect(w);
+    if (loads.n == 0) return (found_list){0};
     bt_idx *floe;
     size_t *first;
     const bt_idx n = by_floe(w, &loads, &floe, &first);
