@@ -154,6 +154,22 @@ static double wedge_of(const bt_world *w, const bt_contact *u, const bt_contact_
     return 0.5 * corner->angle < WEDGE && wedge > 0 ? 1 / wedge : 0;
 }
 
+static bool is_collision(const bt_world *w, const bt_collision *q)
+{
+    const bt_impact_rule *rule = &w->splitting->rule;
+    return rule->conversion != BT_IMPACT_NONE && q->impulse > 0 && q->approach >= rule->least_speed;
+}
+
+/// Of a collision, N; the thinner ice is crushed.
+static double peak_of(const bt_world *w, const bt_contact *u, const bt_collision *q, double corner)
+{
+    const double a = w->bodies.thickness[u->a], b = w->bodies.thickness[u->b];
+    bt_impact e = {.impulse = q->impulse, .approach = q->approach, .mass = q->mass, .corner = corner,
+                   .thickness = a > 0 && b > 0 ? bt_min(a, b) : bt_max(a, b)};
+    bt_impact_convert(&w->splitting->rule, &e);
+    return e.peak;
+}
+
 /// The loads that contact j puts on the floe on its side a or b: what persists, and a collision at its peak.
 static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const centre *c, const bt_collision *q,
                      bool of_b, load_list *to)
@@ -175,14 +191,10 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     const double sign = of_b ? 1 : -1, fx = sign * (nx - rho * ny), fy = sign * (ny + rho * nx);
     const double open = sharp ? wedge_of(w, u, &corner, of_b) : 0;
     double impulse = total;
-    const bt_impact_rule *rule = &w->splitting->rule;
-    if (rule->conversion != BT_IMPACT_NONE && q->impulse > 0 && q->approach >= rule->least_speed) {
-        const double h = b->thickness[other] > 0 ? bt_min(b->thickness[i], b->thickness[other]) : b->thickness[i];
-        bt_impact e = {.impulse = q->impulse, .approach = q->approach, .mass = q->mass, .thickness = h,
-                       .corner = corner.angle};
-        bt_impact_convert(rule, &e);
+    if (is_collision(w, q)) {
+        const double peak = peak_of(w, u, q, corner.angle);
         load_row hit = r;
-        hit.load.fx = e.peak * fx, hit.load.fy = e.peak * fy, hit.load.opening = e.peak * open;
+        hit.load.fx = peak * fx, hit.load.fy = peak * fy, hit.load.opening = peak * open;
         hit.load.collision = true;
         add(to, &hit);
         impulse -= q->impulse;
@@ -193,19 +205,17 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     add(to, &r);
 }
 
-/// Upper bound of the forces that contact j puts on a floe, opening ones with them, N. No wedge opens more than a flat
-/// corner, of 2 μ in bt_split_wedge.
+/// Upper bound of the forces that a contact puts on a floe, opening ones with them, N. A wedge opens no more than a flat
+/// corner would, by 1/(2 μ).
 static double most_of(const bt_world *w, const bt_contact *u)
 {
-    const bt_impact_rule *rule = &w->splitting->rule;
-    const double total = u->ln[0] + u->ln[1], force = (total + fabs(u->lt)) / w->par.dt;
-    if (rule->conversion != BT_IMPACT_NONE) {
-        const bt_collision q = bt_collision_of(w, u);
-        if (q.impulse > 0 && q.approach >= rule->least_speed) return INFINITY;
-    }
+    const double total = u->ln[0] + u->ln[1];
+    const bt_collision q = bt_collision_of(w, u);
+    double force = total / w->par.dt;
+    if (is_collision(w, &q)) force += w->splitting->rule.real_corner ? INFINITY : peak_of(w, u, &q, NAN);
     const bool pair = (u->n == 1 || u->ln[0] == 0 || u->ln[1] == 0) &&
                       (bt_law_on(&w->par, BT_LAW_CRUSHING) || bt_law_on(&w->par, BT_LAW_RAFTING));
-    return pair ? force + total / w->par.dt / (2 * u->mu) : force;
+    return force * (1 + fabs(u->lt) / total + (pair ? 1 / (2 * u->mu) : 0));
 }
 
 /// What is done with the contacts of a cell.
@@ -271,16 +281,19 @@ static void add_cells(bt_world *w, pass what, load_list *to)
     }
 }
 
-/// Sum of forces that body i surely bears, N: of its outline, thickness and strength, which an id has for ever.
-static double borne_by(const bt_world *w, bt_idx i)
+static double size_of(const bt_floe_load *l) { return bt_hypot(l->fx, l->fy) + l->opening; }
+
+/// Does body i surely bear loads of this sum, N? What it bears follows from outline, thickness and strength, which an id
+/// has for ever.
+static bool is_borne(const bt_world *w, bt_idx i, double sum)
 {
     bt_splitting *s = w->splitting;
     double *borne = &s->borne[w->bodies.gid[i]];
     if (*borne == 0) {
         const bt_split_floe f = floe_of(w, i);
-        *borne = bt_split_borne(&f, &s->law);
+        *borne = (1 - 1e-9) * bt_split_borne(&f, &s->law); // less what is rounding in sums and in turned outlines
     }
-    return *borne;
+    return sum <= *borne;
 }
 
 /// Room for a sum of each body and for what each id bears.
@@ -308,15 +321,14 @@ static load_list collect(bt_world *w)
         came.row = bt_domain_gather_all(w, foreign.row, foreign.n, sizeof *foreign.row, &came.n);
         for (size_t k = 0; k < came.n; k++) {
             const bt_idx i = bt_world_index(w, came.row[k].floe);
-            const bt_floe_load *f = &came.row[k].load;
-            if (i >= 0 && bt_domain_owns(w, i)) s->sum[i] += f->collision ? INFINITY : bt_hypot(f->fx, f->fy) + f->opening;
+            if (i >= 0 && bt_domain_owns(w, i)) s->sum[i] += size_of(&came.row[k].load);
         }
     }
     free(foreign.row);
     bool any = false;
 #pragma omp parallel for reduction(|| : any) if (BT_MANY(b->n, 4096))
     for (bt_idx i = 0; i < b->n; i++) {
-        if (s->sum[i] > 0) s->sum[i] = s->sum[i] > (1 - 1e-9) * borne_by(w, i);
+        if (s->sum[i] > 0) s->sum[i] = !is_borne(w, i, s->sum[i]);
         any = any || s->sum[i] > 0;
     }
     if (any) add_cells(w, LIST, &all);
@@ -359,13 +371,17 @@ static judged judge(const bt_world *w, bt_idx i, load_row *row, size_t n)
     bool rafted = false;
     bt_floe_load few[24], *load = n <= 24 ? few : bt_alloc(n, sizeof *load);
     int n_loads = 0;
+    double sum = 0, peak = 0;
     for (size_t k = 0; k < n; k++) {
-        if (row[k].load.fx == 0 && row[k].load.fy == 0) rafted = true;
-        else load[n_loads++] = row[k].load;
+        const bt_floe_load *l = &row[k].load;
+        if (l->fx == 0 && l->fy == 0) rafted = true;
+        else load[n_loads++] = *l;
+        if (l->collision) peak = bt_max(peak, size_of(l));
+        else sum += size_of(l);
     }
     const bt_gid gid = b->gid[i];
     const bt_split_floe f = floe_of(w, i);
-    const bool splits = n_loads > 0 && bt_split_find(&f, load, n_loads, &s->law, &out.best);
+    const bool splits = !is_borne(w, i, sum + peak) && bt_split_find(&f, load, n_loads, &s->law, &out.best);
     if (load != few) free(load);
     if (splits) {
         out.verdict = rafted ? RAFTED : bt_splitting_generation(s, gid) >= s->generations ? TOO_OLD : SPLITS;
