@@ -146,15 +146,17 @@ def wedge_force(half, h):
     return strength * h * SIDE / (4 / r - 0.75)
 
 
-@pytest.mark.parametrize("h", [0.5, 2.0])
-def test_the_speed_at_which_a_crushed_corner_splits_a_floe(tmp_path, h):
+@pytest.mark.parametrize("h, thicker", [(0.5, 1), (2.0, 1), (1.0, 3)])
+def test_the_speed_at_which_a_crushed_corner_splits_a_floe(tmp_path, h, thicker):
     """Peak force of a corner that is crushed at pressure p: v √(2 p h tan φ m), m that of both floes together. The
-    thickness cancels."""
+    thickness cancels, but for a wedge of thicker ice, which weighs more."""
     half, pressure = np.radians(30), 1.5e6
     impact = {"conversion": "crushing", "pressure": pressure, "corner_angle": "60 deg"}
-    speed = wedge_force(half, 1.0) / np.sqrt(2 * pressure * np.tan(half) * DENSITY * SIDE**2 / 2)
+    speed = wedge_force(half, 1.0) / np.sqrt(2 * pressure * np.tan(half) * DENSITY * SIDE**2 * thicker / (1 + thicker))
     for share, splits in ((0.99, 0), (1.01, 1)):
-        r = run(tmp_path / str(share), collision(half, share * speed, h=h, impact=impact))
+        case = collision(half, share * speed, h=h, impact=impact)
+        case["floes"][1]["thickness"] = thicker * h
+        r = run(tmp_path / str(share), case)
         assert r.summary["splitting"]["near"] == splits
 
 
