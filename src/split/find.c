@@ -29,13 +29,15 @@
 //     |M| ≤ (R + e) G + |T| (1 + e √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
 //         (R + e)(G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
 // A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the centroid
-// and l < 2 r, the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and
-// lines from its ends through those of the section meet beyond it: the part lies in their triangle, no higher and no
-// farther from the middle of the section than d = D l/(2 r − l). It has a share s ≤ l d/(2 A) of the area, so
+// and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a point that is
+// cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the triangle of both
+// has the section, on which it is f c long. If the line from Q through m meets c, then |Q m| ≤ f D. If not, m is beside
+// the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2. So |Q m| ≤ d with
+// d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area, and
 //     |N| ≤ G + s (G + |T| R A/J),   |M| ≤ d (G + s (G + |T| R A/J))
 // Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
-// N and M/l of the first two fall with l, those of the last two rise, and h l times the strength rises: between two
-// lengths each is taken where it is largest.
+// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises: between
+// two lengths each is taken where it is largest.
 #include "split/find.h"
 #include "base/elementary.h"
 
@@ -86,9 +88,9 @@ static double bound_between(const bt_split_floe *f, const form *o, double size, 
     const double off = sqrt(bt_max(0, radius * radius - low * low / 4));
     double normal = size + torque * sqrt(ratio) / 2;
     double bending = ((radius + off) * size + torque * (1 + off * sqrt(ratio)) / 2) / low; // M/l
-    if (high <= o->inradius) {
-        const double slope = 2 * radius / (2 * o->inradius - high) + 2 * law->slop / low; // d/l
-        const double share = bt_min(1, high * high * slope / (2 * o->area));
+    if (high <= 2 * o->inradius) {
+        const double slope = radius / o->inradius + 2 * law->slop / low; // d/l
+        const double share = bt_min(1, high * high * slope / o->area);
         const double part = size + share * (size + torque * radius * ratio);
         normal = bt_min(normal, part);
         bending = bt_min(bending, slope * part);
@@ -107,8 +109,8 @@ static double bound(const bt_split_floe *f, const form *o, double size, double t
                     const bt_split_law *law, double l)
 {
     double most = 0;
-    while (l < o->inradius) {
-        const double high = bt_min(STEP * l, o->inradius);
+    while (l < 2 * o->inradius) {
+        const double high = bt_min(STEP * l, 2 * o->inradius);
         most = bt_max(most, bound_between(f, o, size, torque, opening, law, l, high));
         l = high;
     }
