@@ -22,20 +22,22 @@
 // each nowhere narrower than that, has none: one of them has no chord parallel to the section longer than it, and the
 // width of a convex body is at most its longest chord of any direction.
 //
-// Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
-// D = 2 R, and loads on the outline:
+// Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid, and
+// loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here:
 //     |N| ≤ G + |T| √(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
 //         |S1| = |S2|, so each is at most half of ∫ r dA ≤ √(A J).
-//     |M| ≤ D G + |T| (1 + R √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
-//         D (G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
-// A short section of a convex floe cuts off little. With r the distance of the nearest edge from the centroid and
-// l < 2 r, the chord through the centre of the inscribed circle parallel to the section is at least 2 r long, and lines
-// from its ends through those of the section meet beyond it: the part lies in their triangle, no wider than
-// d = D l/(2 r − l).
-//     |M| ≤ d (2 G + |T| R A/J)
+//     |M| ≤ (R + e) G + |T| (1 + e √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
+//         (R + e)(G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
+// A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the centroid
+// and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a point that is
+// cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the triangle of both
+// has the section, on which it is f c long. If the line from Q through m meets c, then |Q m| ≤ f D. If not, m is beside
+// the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2. So |Q m| ≤ d with
+// d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area, and
+//     |N| ≤ G + s (G + |T| R A/J),   |M| ≤ d (G + s (G + |T| R A/J))
 // Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
-// Both bounds over l and l² fall with l, and the second is above the first from l = r on; so a bound at the least
-// length is one for all.
+// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises: between
+// two lengths each is taken where it is largest.
 #include "split/find.h"
 #include "base/elementary.h"
 
@@ -76,28 +78,57 @@ static form form_of(const bt_split_floe *f)
     return o;
 }
 
+static const double STEP = 1.3; // ratio of the lengths between which a bound is taken at once
+
+/// Upper bound of stress over strength of sections of these lengths; size G, opening P.
+static double bound_between(const bt_split_floe *f, const form *o, double size, double torque, double opening,
+                            const bt_split_law *law, double low, double high)
+{
+    const double radius = o->radius, ratio = o->area / o->polar;
+    const double off = sqrt(bt_max(0, radius * radius - low * low / 4));
+    double normal = size + torque * sqrt(ratio) / 2;
+    double bending = ((radius + off) * size + torque * (1 + off * sqrt(ratio)) / 2) / low; // M/l
+    if (high <= 2 * o->inradius) {
+        const double slope = radius / o->inradius + 2 * law->slop / low; // d/l
+        const double share = bt_min(1, high * high * slope / o->area);
+        const double part = size + share * (size + torque * radius * ratio);
+        normal = bt_min(normal, part);
+        bending = bt_min(bending, slope * part);
+    }
+    const double strength = bt_split_strength(law, low, false), hl = f->thickness * low;
+    double most = (normal + 6 * bending) / (hl * strength);
+    if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, low, true));
+    // b = l of burst is below that; b = A/l is largest at l = D
+    const double d = 2 * radius;
+    return bt_max(most, BURST_HELD * size * d / (f->thickness * o->area * bt_split_strength(law, d, false))) /
+           f->factor;
+}
+
+/// Of all sections of length l and more.
 static double bound(const bt_split_floe *f, const form *o, double size, double torque, double opening,
                     const bt_split_law *law, double l)
 {
-    const double d = 2 * o->radius, ratio = o->area / o->polar, g = o->radius * sqrt(ratio);
-    const double normal = size + torque * sqrt(ratio) / 2;
-    double moment = d * size + torque * (1 + g) / 2;
-    if (l < o->inradius) {
-        const double cap = d * l / (2 * o->inradius - l) + 2 * law->slop;
-        moment = bt_min(moment, cap * (2 * size + torque * o->radius * ratio));
+    double most = 0;
+    while (l < 2 * o->inradius) {
+        const double high = bt_min(STEP * l, 2 * o->inradius);
+        most = bt_max(most, bound_between(f, o, size, torque, opening, law, l, high));
+        l = high;
     }
-    const double strength = bt_split_strength(law, l, false), hl = f->thickness * l;
-    double most = (normal + 6 * moment / l) / (hl * strength);
-    if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, l, true));
-    // b = l of burst is below that; b = A/l is largest at l = D
-    return bt_max(most, BURST_HELD * size * d / (f->thickness * o->area * bt_split_strength(law, d, false))) /
-           f->factor;
+    return bt_max(most, bound_between(f, o, size, torque, opening, law, l, INFINITY));
 }
 
 double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l)
 {
     const form o = form_of(f);
     return bound(f, &o, loads->size, fabs(loads->torque), loads->opening, law, l);
+}
+
+double bt_split_borne(const bt_split_floe *f, const bt_split_law *law)
+{
+    const form o = form_of(f);
+    if (!(2 * o.radius >= law->least_width)) return INFINITY;
+    const double l = law->least_width; // the bound is linear in sizes and opening forces
+    return 1 / bt_max(bound(f, &o, 1, o.radius, 0, law, l), bound(f, &o, 0, 0, 1, law, l));
 }
 
 /// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
@@ -192,7 +223,7 @@ static void consider(const search *s, bt_chord c, bool from_contact)
     const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
     const bt_load_case *w = s->loads;
     if (!(l >= s->law->least_width) || !(l > s->law->slop)) return;
-    if (!(bound(s->floe, s->form, w->size, fabs(w->torque), w->opening, s->law, l) > 1)) return;
+    if (!(bound_between(s->floe, s->form, w->size, fabs(w->torque), w->opening, s->law, l, l) > 1)) return;
     const bt_section q = bt_section_of(s->floe, s->form->area, s->form->polar, w, &c, s->law->slop);
     bt_split_mode mode;
     const double ratio = demand(s, &q, &mode);
@@ -305,19 +336,8 @@ static int by_contact(const void *a, const void *b)
 bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best)
 {
     *best = (bt_split){.peak = -1};
-    double size = 0, peak = 0, opening = 0;
-    for (int k = 0; k < n_loads; k++) {
-        const double force = bt_hypot(load[k].fx, load[k].fy);
-        if (load[k].collision) peak = bt_max(peak, force);
-        else size += force;
-        opening += load[k].opening;
-    }
-    size += peak;
-    if (!(size + opening > 0)) return false;
     const form o = form_of(f);
     if (!(2 * o.radius >= law->least_width)) return false;
-    if (!(bound(f, &o, size, size * o.radius, opening, law, law->least_width) > 1)) return false;
-
     qsort(load, (size_t)n_loads, sizeof *load, by_contact);
     bt_edge_load few[16], *on_edge = n_loads <= 16 ? few : bt_alloc((size_t)n_loads, sizeof *on_edge);
     for (int k = 0; k < n_loads; k++) on_edge[k] = bt_edge_load_of(f, &load[k], law->slop);

@@ -35,6 +35,9 @@ typedef struct bt_split {
 /// whose ratios agree to 1e-9 the first one counts. Safe in threads.
 bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best);
 
+/// Loads whose sizes, with their opening forces, add up to no more than this, N, split no such floe (find.c).
+double bt_split_borne(const bt_split_floe *f, const bt_split_law *law);
+
 /// Upper bound of the ratio of every section of this length or longer, m, whichever the loads (find.c).
 double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l);
 

@@ -24,6 +24,8 @@ void bt_splitting_free(bt_splitting *s)
     free(s->split);
     free(s->begin);
     free(s->vertex);
+    free(s->sum);
+    free(s->borne);
     free(s);
 }
 
@@ -91,6 +93,21 @@ static bool may_split(const bt_world *w, bt_idx i)
     return b->motion[i] == BT_DYNAMIC && b->thickness[i] > 0 && b->gid[i] != w->towed;
 }
 
+/// Body i as the law sees it.
+static bt_split_floe floe_of(const bt_world *w, bt_idx i)
+{
+    const bt_splitting *s = w->splitting;
+    const bt_bodies *b = &w->bodies;
+    bt_split_floe f = {.n = bt_body_corners(b, i), .outline = b->outline + 2 * b->offset[i],
+                       .convex = bt_part_first(b, i) == 0, .thickness = b->thickness[i], .factor = 1};
+    if (s->modulus > 0) {
+        int64_t path;
+        const bt_gid ancestor = bt_splitting_ancestor(s, b->gid[i], &path);
+        f.factor = bt_split_scatter(s->seed, ancestor, path, s->modulus);
+    }
+    return f;
+}
+
 /// A contact with a normal impulse: where its pressure has its centre, and on what length it bears.
 typedef struct {
     double ran, rbn;    ///< ra×n, rb×n of the centre, m
@@ -98,13 +115,21 @@ typedef struct {
     int at;             ///< the point that bears most
 } centre;
 
-/// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer one. One
-/// point bears on what it crushes, F/(p h), or on a point where nothing is crushed.
-static centre centre_of(const bt_world *w, const bt_contact *u)
+/// Is contact j the edge of floes that have rafted (contact/raft.h)?
+static bool is_raft_edge(const bt_world *w, const bt_cell *cell, bt_idx j)
 {
+    return bt_law_on(&w->par, BT_LAW_RAFTING) && cell->laws.limits[j].record[BT_LAW_RAFTING] >= 0;
+}
+
+/// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer end: that
+/// is the nearer point itself, and where floes have rafted a half of the way between the points beyond it. One point
+/// bears on what it crushes, F/(p h), or on a point where nothing is crushed.
+static centre centre_of(const bt_world *w, const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *u = &cell->contacts[j];
     const double total = u->ln[0] + u->ln[1], s0 = u->ln[0] / total, s1 = u->ln[1] / total;
     centre c = {.ran = s0 * u->ran[0] + s1 * u->ran[1], .rbn = s0 * u->rbn[0] + s1 * u->rbn[1], .at = s1 > s0};
-    if (u->n > 1) c.length = 2 * bt_min(s0, s1) * fabs(u->ran[1] - u->ran[0]);
+    if (u->n > 1) c.length = (2 * bt_min(s0, s1) + is_raft_edge(w, cell, j)) * fabs(u->ran[1] - u->ran[0]);
     const bt_bodies *b = &w->bodies;
     const double pressure = w->par.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE],
                  h = bt_max(b->thickness[u->a], b->thickness[u->b]);
@@ -129,6 +154,22 @@ static double wedge_of(const bt_world *w, const bt_contact *u, const bt_contact_
     return 0.5 * corner->angle < WEDGE && wedge > 0 ? 1 / wedge : 0;
 }
 
+static bool is_collision(const bt_world *w, const bt_collision *q)
+{
+    const bt_impact_rule *rule = &w->splitting->rule;
+    return rule->conversion != BT_IMPACT_NONE && q->impulse > 0 && q->approach >= rule->least_speed;
+}
+
+/// Of a collision, N; the thinner ice is crushed.
+static double peak_of(const bt_world *w, const bt_contact *u, const bt_collision *q, double corner)
+{
+    const double a = w->bodies.thickness[u->a], b = w->bodies.thickness[u->b];
+    bt_impact e = {.impulse = q->impulse, .approach = q->approach, .mass = q->mass, .corner = corner,
+                   .thickness = a > 0 && b > 0 ? bt_min(a, b) : bt_max(a, b)};
+    bt_impact_convert(&w->splitting->rule, &e);
+    return e.peak;
+}
+
 /// The loads that contact j puts on the floe on its side a or b: what persists, and a collision at its peak.
 static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const centre *c, const bt_collision *q,
                      bool of_b, load_list *to)
@@ -141,7 +182,7 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     const double nx = u->nx, ny = u->ny, rho = u->lt / total;
     const bt_contact_corner corner =
         bt_contact_corner_of(b, u, part, cell->gaps[j].feature[c->at]);
-    const bool sharp = u->n == 1 || u->ln[1 - c->at] == 0;
+    const bool sharp = !is_raft_edge(w, cell, j) && (u->n == 1 || u->ln[1 - c->at] == 0);
     load_row r = {
         .floe = b->gid[i],
         .load = {.x = along * nx + across * ny, .y = along * ny - across * nx, .edge_x = -ny, .edge_y = nx,
@@ -150,14 +191,10 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     const double sign = of_b ? 1 : -1, fx = sign * (nx - rho * ny), fy = sign * (ny + rho * nx);
     const double open = sharp ? wedge_of(w, u, &corner, of_b) : 0;
     double impulse = total;
-    const bt_impact_rule *rule = &w->splitting->rule;
-    if (rule->conversion != BT_IMPACT_NONE && q->impulse > 0 && q->approach >= rule->least_speed) {
-        const double h = b->thickness[other] > 0 ? bt_min(b->thickness[i], b->thickness[other]) : b->thickness[i];
-        bt_impact e = {.impulse = q->impulse, .approach = q->approach, .mass = q->mass, .thickness = h,
-                       .corner = corner.angle};
-        bt_impact_convert(rule, &e);
+    if (is_collision(w, q)) {
+        const double peak = peak_of(w, u, q, corner.angle);
         load_row hit = r;
-        hit.load.fx = e.peak * fx, hit.load.fy = e.peak * fy, hit.load.opening = e.peak * open;
+        hit.load.fx = peak * fx, hit.load.fy = peak * fy, hit.load.opening = peak * open;
         hit.load.collision = true;
         add(to, &hit);
         impulse -= q->impulse;
@@ -168,20 +205,54 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     add(to, &r);
 }
 
-static void add_cell(const bt_world *w, const bt_cell *cell, load_list *to)
+/// Upper bound of the forces that a contact puts on a floe, opening ones with them, N. A wedge opens no more than a flat
+/// corner would, by 1/(2 μ).
+static double most_of(const bt_world *w, const bt_contact *u)
+{
+    const double total = u->ln[0] + u->ln[1];
+    const bt_collision q = bt_collision_of(w, u);
+    double force = total / w->par.dt;
+    if (is_collision(w, &q)) force += w->splitting->rule.real_corner ? INFINITY : peak_of(w, u, &q, NAN);
+    const bool pair = (u->n == 1 || u->ln[0] == 0 || u->ln[1] == 0) &&
+                      (bt_law_on(&w->par, BT_LAW_CRUSHING) || bt_law_on(&w->par, BT_LAW_RAFTING));
+    return force * (1 + fabs(u->lt) / total + (pair ? 1 / (2 * u->mu) : 0));
+}
+
+/// What is done with the contacts of a cell.
+typedef enum {
+    SUM, ///< bounds of the loads on floes that this rank owns are added up, and the loads on others listed
+    LIST ///< loads on its own floes that are to be looked at are listed
+} pass;
+
+static bool is_mine(const bt_world *w, bt_idx i) { return !w->domain || bt_domain_owns(w, i); }
+
+/// For body i of a contact: is its load to be listed? In the first pass `most`, N, is added where it is not.
+static bool is_listed(bt_world *w, bt_idx i, pass what, double most)
+{
+    double *sum = &w->splitting->sum[i];
+    if (!is_mine(w, i)) return what == SUM;
+    if (what == LIST) return *sum > 0;
+#pragma omp atomic
+    *sum += most;
+    return false;
+}
+
+static void add_cell(bt_world *w, const bt_cell *cell, pass what, load_list *to)
 {
     const bt_bodies *b = &w->bodies;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         if (u->n == 0) {
-            add(to, &(load_row){.floe = b->gid[u->a]});
-            add(to, &(load_row){.floe = b->gid[u->b]});
+            if (is_listed(w, u->a, what, 0)) add(to, &(load_row){.floe = b->gid[u->a]});
+            if (is_listed(w, u->b, what, 0)) add(to, &(load_row){.floe = b->gid[u->b]});
             continue;
         }
         if (!(u->ln[0] + u->ln[1] > 0)) continue;
-        const bool a = may_split(w, u->a), of_b = may_split(w, u->b);
+        const double most = what == SUM ? most_of(w, u) : 0;
+        const bool a = may_split(w, u->a) && is_listed(w, u->a, what, most),
+                   of_b = may_split(w, u->b) && is_listed(w, u->b, what, most);
         if (!a && !of_b) continue;
-        const centre c = centre_of(w, u);
+        const centre c = centre_of(w, cell, j);
         const bt_collision q = bt_collision_of(w, u);
         if (a) add_side(w, cell, j, &c, &q, false, to);
         if (of_b) add_side(w, cell, j, &c, &q, true, to);
@@ -189,38 +260,83 @@ static void add_cell(const bt_world *w, const bt_cell *cell, load_list *to)
     for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
         const bt_memory *m = &cell->laws.memory[k];
         if (m->law != BT_LAW_RAFTING) continue;
-        add(to, &(load_row){.floe = m->a});
-        add(to, &(load_row){.floe = m->b});
+        for (int side = 0; side < 2; side++) {
+            const bt_idx i = bt_world_index(w, side ? m->b : m->a);
+            if (i < 0 ? what == SUM : is_listed(w, i, what, 0)) add(to, &(load_row){.floe = side ? m->b : m->a});
+        }
     }
 }
 
-/// Collective. Loads of the floes that this rank owns; of them, some may be found by others.
-static load_list collect(const bt_world *w)
+static void add_cells(bt_world *w, pass what, load_list *to)
 {
     const bt_cells *t = w->cells;
-    load_list all = {0}, foreign = {0};
 #pragma omp parallel if (BT_MANY(t->n_order, BT_FEW_CELLS))
     {
         load_list mine = {0};
 #pragma omp for schedule(dynamic, 16) nowait
-        for (bt_idx i = 0; i < t->n_order; i++) add_cell(w, &t->cell[t->order[i]], &mine);
+        for (bt_idx i = 0; i < t->n_order; i++) add_cell(w, &t->cell[t->order[i]], what, &mine);
 #pragma omp critical
-        for (size_t i = 0; i < mine.n; i++) {
-            const bt_idx k = bt_world_index(w, mine.row[i].floe);
-            add(k >= 0 && bt_domain_owns(w, k) ? &all : &foreign, &mine.row[i]);
-        }
+        for (size_t i = 0; i < mine.n; i++) add(to, &mine.row[i]);
         free(mine.row);
     }
+}
+
+static double size_of(const bt_floe_load *l) { return bt_hypot(l->fx, l->fy) + l->opening; }
+
+/// Does body i surely bear loads of this sum, N? What it bears follows from outline, thickness and strength, which an id
+/// has for ever.
+static bool is_borne(const bt_world *w, bt_idx i, double sum)
+{
+    bt_splitting *s = w->splitting;
+    double *borne = &s->borne[w->bodies.gid[i]];
+    if (*borne == 0) {
+        const bt_split_floe f = floe_of(w, i);
+        *borne = (1 - 1e-9) * bt_split_borne(&f, &s->law); // less what is rounding in sums and in turned outlines
+    }
+    return sum <= *borne;
+}
+
+/// Room for a sum of each body and for what each id bears.
+static void make_room(bt_splitting *s, const bt_bodies *b)
+{
+    if (s->cap_sum < b->n) {
+        free(s->sum);
+        s->sum = bt_alloc((size_t)(s->cap_sum = b->n + b->n / 4), sizeof *s->sum);
+    } else memset(s->sum, 0, (size_t)b->n * sizeof *s->sum);
+    if (s->cap_borne >= b->n_global) return;
+    s->borne = bt_realloc(s->borne, (size_t)b->n_global, sizeof *s->borne);
+    for (; s->cap_borne < b->n_global; s->cap_borne++) s->borne[s->cap_borne] = 0;
+}
+
+/// Collective. Loads of the floes that this rank owns, but for those of floes whose loads together are too small to
+/// split them, in nearly all steps nearly all. Contacts of a floe may be found by other ranks, which send its loads.
+static load_list collect(bt_world *w)
+{
+    bt_splitting *s = w->splitting;
+    const bt_bodies *b = &w->bodies;
+    make_room(s, b);
+    load_list all = {0}, foreign = {0}, came = {0};
+    add_cells(w, SUM, &foreign);
     if (w->domain) {
-        size_t n;
-        load_row *rows = bt_domain_gather_all(w, foreign.row, foreign.n, sizeof *rows, &n);
-        for (size_t i = 0; i < n; i++) {
-            const bt_idx k = bt_world_index(w, rows[i].floe);
-            if (k >= 0 && bt_domain_owns(w, k)) add(&all, &rows[i]);
+        came.row = bt_domain_gather_all(w, foreign.row, foreign.n, sizeof *foreign.row, &came.n);
+        for (size_t k = 0; k < came.n; k++) {
+            const bt_idx i = bt_world_index(w, came.row[k].floe);
+            if (i >= 0 && bt_domain_owns(w, i)) s->sum[i] += size_of(&came.row[k].load);
         }
-        free(rows);
     }
     free(foreign.row);
+    bool any = false;
+#pragma omp parallel for reduction(|| : any) if (BT_MANY(b->n, 4096))
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (s->sum[i] > 0) s->sum[i] = !is_borne(w, i, s->sum[i]);
+        any = any || s->sum[i] > 0;
+    }
+    if (any) add_cells(w, LIST, &all);
+    for (size_t k = 0; k < came.n; k++) {
+        const bt_idx i = bt_world_index(w, came.row[k].floe);
+        if (i >= 0 && bt_domain_owns(w, i) && s->sum[i] > 0) add(&all, &came.row[k]);
+    }
+    free(came.row);
     return all;
 }
 
@@ -255,19 +371,17 @@ static judged judge(const bt_world *w, bt_idx i, load_row *row, size_t n)
     bool rafted = false;
     bt_floe_load few[24], *load = n <= 24 ? few : bt_alloc(n, sizeof *load);
     int n_loads = 0;
+    double sum = 0, peak = 0;
     for (size_t k = 0; k < n; k++) {
-        if (row[k].load.fx == 0 && row[k].load.fy == 0) rafted = true;
-        else load[n_loads++] = row[k].load;
+        const bt_floe_load *l = &row[k].load;
+        if (l->fx == 0 && l->fy == 0) rafted = true;
+        else load[n_loads++] = *l;
+        if (l->collision) peak = bt_max(peak, size_of(l));
+        else sum += size_of(l);
     }
     const bt_gid gid = b->gid[i];
-    bt_split_floe f = {.n = bt_body_corners(b, i), .outline = b->outline + 2 * b->offset[i],
-                       .convex = bt_part_first(b, i) == 0, .thickness = b->thickness[i], .factor = 1};
-    if (s->modulus > 0) {
-        int64_t path;
-        const bt_gid ancestor = bt_splitting_ancestor(s, gid, &path);
-        f.factor = bt_split_scatter(s->seed, ancestor, path, s->modulus);
-    }
-    const bool splits = n_loads > 0 && bt_split_find(&f, load, n_loads, &s->law, &out.best);
+    const bt_split_floe f = floe_of(w, i);
+    const bool splits = !is_borne(w, i, sum + peak) && bt_split_find(&f, load, n_loads, &s->law, &out.best);
     if (load != few) free(load);
     if (splits) {
         out.verdict = rafted ? RAFTED : bt_splitting_generation(s, gid) >= s->generations ? TOO_OLD : SPLITS;
@@ -509,9 +623,10 @@ static bt_memory *change(bt_world *w, bt_memory *memory, int64_t *n, const void 
 enum { N_DEFERRED, N_TOO_SMALL, N_TOO_OLD, N_RAFTED, N_COUNTS };
 
 /// Floes that split by the loads of this solution: those of this rank. *most: largest ratio of one that cannot.
-static found_list find(const bt_world *w, bt_sum count[N_COUNTS], double *most)
+static found_list find(bt_world *w, bt_sum count[N_COUNTS], double *most)
 {
     load_list loads = collect(w);
+    if (loads.n == 0) return (found_list){0};
     bt_idx *floe;
     size_t *first;
     const bt_idx n = by_floe(w, &loads, &floe, &first);
@@ -543,7 +658,7 @@ static void book(bt_splitting *s, const bt_split_record *r)
     s->total.by_mode[r->mode]++;
     s->total.crack_length += length;
     s->total.work += bt_split_work(s->law.toughness, r->thickness, length);
-    s->now++;
+    s->total.steps += s->now++ == 0;
 }
 
 bool bt_splitting_step(bt_world *w, int round)
@@ -580,7 +695,6 @@ bool bt_splitting_step(bt_world *w, int round)
         s->total.too_old += (int64_t)bt_sum_value(&all.sum[N_TOO_OLD]);
         s->total.rafted += (int64_t)bt_sum_value(&all.sum[N_RAFTED]);
         s->total.largest_refused = bt_max(s->total.largest_refused, all.most);
-        s->total.steps += s->now > 0;
     }
     free(found.row);
     free(found.vertex);

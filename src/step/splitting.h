@@ -77,6 +77,10 @@ typedef struct bt_splitting {
     int64_t n_vertices, cap_vertices;
     bt_split_totals total;
     int64_t now;                ///< splits in the last step
+    double *sum;                ///< [cap_sum ≥ bodies] of a solution: of the loads of each body, N
+    double *borne;              ///< [cap_borne ≥ ids] N, 0 = not yet known (bt_split_borne)
+    bt_idx cap_sum;
+    bt_gid cap_borne;
 } bt_splitting;
 
 void bt_splitting_free(bt_splitting *s);

@@ -475,6 +475,9 @@ static void test_bound(void **state)
             if (!(ratio <= most) || !(ratio <= shorter))
                 fail_msg("trial %d: ratio %g, bound %g, from a third of the length on %g", trial, ratio, most, shorter);
             tightest = fmax(tightest, ratio / most);
+            law.least_width = l;
+            const double sum = w.size + w.opening, borne = bt_split_borne(&s, &law); // by the sum alone
+            if (!(ratio <= sum / borne)) fail_msg("trial %d: ratio %g, by the sum %g", trial, ratio, sum / borne);
         }
     }
     assert_true(tightest > 0.2); // and it is no bound that says nothing
