@@ -274,7 +274,7 @@ static const char *bytes(double b, char out[32])
 /// n: the ice of the run, with its lead.
 static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice *n)
 {
-    const double per_step = bt_cost_floe_step(n->concentration), seconds = bt_check_seconds(c, n);
+    const double per_step = bt_cost_floe_step(c, n->concentration), seconds = bt_check_seconds(c, n);
     const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size),
                        several = bt_cost_disk_of(c, n->count, n->corners, 2);
     char a[32], b[32], e[32];

@@ -34,24 +34,26 @@ static const double CHECKPOINT_BASE = 135e3, CHECKPOINT_FLOE = 180, CHECKPOINT_C
 static const double TEXTS = 38e3, XDMF_FRAME = 4440, XDMF_LINE = 880;
 static const double VORONOI_CORNERS = 5.6;
 
+static const double RAFTING = 1.8; // time of a step of floes that raft / of rigid ones
+
 static double entries_of(const bt_case *c)
 {
     return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every));
 }
 
-double bt_cost_floe_step(double concentration)
+double bt_cost_floe_step(const bt_case *c, double concentration)
 {
-    const double x = bt_min(0.95, bt_max(0, concentration));
-    if (x < 0.5) return 0.4e-6 * bt_pow(2, (x - 0.2) / 0.3);
-    if (x < 0.8) return 0.8e-6 * bt_pow(2.75, (x - 0.5) / 0.3);
-    return 2.2e-6 * bt_pow(2.1, (x - 0.8) / 0.15);
+    const double x = bt_min(0.95, bt_max(0, concentration)), law = c->ice.rafting_kappa > 0 ? RAFTING : 1;
+    if (x < 0.5) return law * 0.4e-6 * bt_pow(2, (x - 0.2) / 0.3);
+    if (x < 0.8) return law * 0.8e-6 * bt_pow(2.75, (x - 0.5) / 0.3);
+    return law * 2.2e-6 * bt_pow(2.1, (x - 0.8) / 0.15);
 }
 
 // --- time ------------------------------------------------------------------------------------------------------------
 
 // Of any step; of an entry of the series, with its share of the flushes; of a frame, and of a floe in it; of the start,
 // s.
-static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 0.3e-6, START = 0.03;
+static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 6e-6, START = 0.1;
 // Of a convex part of a floe, and of a pair of parts of two floes that are near each other, each step, s.
 static const double PART = 0.05e-6, PAIR = 6e-9;
 
@@ -70,7 +72,7 @@ double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice)
 {
     const double parts = PART * ice->parts +
                          (ice->split > 0 ? PAIR * ice->concentration * ice->parts * ice->parts / ice->split : 0);
-    return START + (double)bt_case_steps(c) * (STEP + ice->floes * bt_cost_floe_step(ice->concentration) + parts) +
+    return START + (double)bt_case_steps(c) * (STEP + ice->floes * bt_cost_floe_step(c, ice->concentration) + parts) +
            ENTRY * entries_of(c) + bt_cost_frames(c) * (FRAME + FRAME_FLOE * ice->floes);
 }
 

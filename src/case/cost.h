@@ -15,9 +15,10 @@ enum {
 };
 
 /// Seconds a floe and step on one core, measured on cases/basin and cases/studies/concentration.yml (AMD EPYC, 2026):
-/// 0.4, 0.8, 2.2 and 4.6 µs at 20, 50, 80 and 95 %. Between them the logarithm is linear. A pack so large that most
-/// floes rest costs less, a closed one that jams more: the order of magnitude, no more.
-double bt_cost_floe_step(double concentration);
+/// 0.4, 0.8, 2.2 and 4.6 µs at 20, 50, 80 and 95 %. Between them the logarithm is linear. Of floes that raft
+/// (cases/route/uniform.yml) 1.8 times as much. A pack so large that most floes rest costs less, a closed one that jams
+/// more: the order of magnitude, no more.
+double bt_cost_floe_step(const bt_case *c, double concentration);
 
 /// The ice of a run.
 typedef struct bt_cost_ice {
@@ -31,9 +32,9 @@ typedef struct bt_cost_ice {
 double bt_cost_making(const bt_case *c, double floes);
 
 /// Processor time of the steps of a run and of what they leave, s: 8 µs a step, bt_cost_floe_step a floe, 17 µs an
-/// entry of the series, 1 ms and 0.3 µs a floe a frame; of floes that are not convex 0.05 µs a part, and the pairs of
-/// parts of two floes, of which a floe has more neighbours the denser the ice is. Measured on runs of 1 to 260,000
-/// steps, and on outlines of 12 to 120 corners in 3 to 80 parts.
+/// entry of the series, 1 ms and 6 µs a floe a frame, which is packed; 0.1 s to start and to end; of floes that are not
+/// convex 0.05 µs a part, and the pairs of parts of two floes, of which a floe has more neighbours the denser the ice
+/// is. Measured on runs of 1 to 260,000 steps, and on outlines of 12 to 120 corners in 3 to 80 parts.
 double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice);
 
 /// Both, of a case whose ice is made or given by hand.

@@ -310,14 +310,26 @@ class Files:
             output.gpx(self.some, self.s.place, self.folder / "routes.gpx", self.force)
 
 
-def estimate(program, s, some, n, jobs):
-    """Seconds of wall time that the tows take, by the estimate of `bergtow check`."""
-    total = 0.0
-    for c in some:
-        keys = situation.reading(s.values, s.field) | c.keys
-        cost = json.loads(checked(program, s.case, [f"{k}={v}" for k, v in keys.items()], "--json"))["cost"]
-        total += cost["core_time_s"] * -(-n // jobs)
-    return total
+def estimate(runs, s, some, n):
+    """Seconds by the estimate of `bergtow check`: of the first candidate's tow that keeps frames, of one that does not,
+    and of wall time of the n tows of every candidate."""
+    keys = situation.reading(s.values, s.field) | some[0].keys
+    replay, plain = (json.loads(checked(runs.program, s.case, runs.sets(i, keys), "--json"))["cost"]["core_time_s"]
+                     for i in (0, 1))
+    ways = sum(c.seconds for c in some) / some[0].seconds
+    return replay, plain, ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
+
+
+def piloted(runs, c, n, told):
+    """Seconds of wall time of all tows, by the first ones of candidate c, as many at a time as all will be; None where
+    they were there before. told: estimate()."""
+    replay, plain, total = told
+    some = range(1, min(n, 1 + runs.jobs)) if n > 1 else range(1)  # the first member keeps frames
+    clock, made = time.monotonic(), runs.made
+    why = tow(runs, c.name, some, c.keys)
+    if any(why) or runs.made - made < len(some):
+        return None
+    return total * (time.monotonic() - clock) / (plain if n > 1 else replay)
 
 
 def perform(a):
@@ -367,10 +379,10 @@ def perform(a):
             print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one "
                   "lies a width apart from these.")
         n = 1 if w["errors"].none else a.members
-        seconds = estimate(program, s, some, n, a.jobs)
-        found["estimate_s"] = seconds
+        told = estimate(runs, s, some, n)
+        found["estimate_s"] = told[-1]
         print(f"\n{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, rough estimate "
-              f"{words.amount(seconds, 's')} with {a.jobs} at a time\n")
+              f"{words.amount(told[-1], 's')} with {a.jobs} at a time\n", flush=True)
         if a.plan_only:
             print(words.answer(writing.plain(found)))
             print(folder / "route.json")
@@ -379,22 +391,19 @@ def perform(a):
             from bergtow.routing import horizon
             horizon.follow(a, w, s, goal, weights, factor, runs, files, found, plan)
         else:
-            verify(a, w, s, goal, some, n, runs, files, found)
+            verify(a, w, s, goal, some, n, runs, files, found, told)
 
 
-def verify(a, w, s, goal, some, n, runs, files, found):
+def verify(a, w, s, goal, some, n, runs, files, found, told):
     """Tow every candidate through the members, and judge."""
     folder, began = files.folder, time.monotonic()
     runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
-    clock, made = time.monotonic(), runs.made
-    tow(runs, some[0].name, range(1), some[0].keys)
-    if runs.made > made:  # what the first tow took is a better scale than the estimate of `bergtow check`
-        ways = sum(float(c.keys["run.duration"].split()[0]) for c in some) / float(
-            some[0].keys["run.duration"].split()[0])
-        found["estimate_by_tow_s"] = (time.monotonic() - clock) * ways * -(-n // a.jobs)
-        print(f"by the first tow: {words.amount(found['estimate_by_tow_s'], 's')} in all\n")
+    seconds = piloted(runs, some[0], n, told)
+    if seconds is not None:
+        found["estimate_by_tow_s"] = seconds
+        print(f"by the first tows: {words.amount(seconds, 's')} in all\n", flush=True)
     for c in some:
         why = tow(runs, c.name, range(n), c.keys)
         if SPENT in why:

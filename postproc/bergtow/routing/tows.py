@@ -45,6 +45,11 @@ class Candidate:
     points: np.ndarray = None                 #: [k, 2] way-points of the case, m
 
     @property
+    def seconds(self):
+        """run.duration"""
+        return float(self.keys["run.duration"].split()[0])
+
+    @property
     def straight(self):
         return self.route.kind == "straight"
 
