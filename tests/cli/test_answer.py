@@ -16,6 +16,7 @@ from harness import run as simulated
 
 import bergtow
 from bergtow import cli
+from bergtow.errors import BergtowError
 from bergtow.reporting import design
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.result.members import Members
@@ -188,6 +189,35 @@ def test_the_speed_up_to_which_a_vessel_holds():
 @pytest.mark.parametrize("text, newtons", [("110 t", 110 * 9806.65), ("1.1 MN", 1.1e6), ("900 kN", 9e5), ("tug", None)])
 def test_forces_of_options(text, newtons):
     assert gear.force(text, "--vessel") == newtons
+
+
+@pytest.mark.parametrize("option, text, value", [
+    ("budget", "90", 90), ("budget", "1.5 h", 90), ("concentrations", "70 %,0.5", [0.5, 0.7]),
+    ("efficiency", "80 %", 0.8), ("efficiency", "1", 1), ("line-length", "0.5 km", 500),
+    ("head-current", "1 kn", 1852 / 3600),
+    ("bend", "90", math.pi / 2), ("bend", "-30 deg", -math.pi / 6), ("speeds", "1 m/s,0.5", [1.0, 0.5]),
+    ("budget", "3 kn", "a time"), ("concentrations", "97 %", "95 %"), ("efficiency", "1.2", "100 %"),
+    ("line-length", "3 kg", "length"), ("head-wind", "-1", "below zero"), ("bend", "400", "150 degrees"),
+    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"), ("speeds", "1 kn,", "a speed")])
+def test_options_take_units_and_say_what_is_wrong(option, text, value):
+    """Red: a bare float() as the type, whose message names a function of the program."""
+    words_of = ["design", "case.yml", f"--{option}={text}"]
+    if isinstance(value, str):
+        with pytest.raises(BergtowError, match=value) as error:
+            cli.tree("design").parse_args(words_of)
+        assert "invalid" not in str(error.value)
+    else:
+        assert getattr(cli.tree("design").parse_args(words_of), option.replace("-", "_")) == pytest.approx(value)
+
+
+def test_tables_that_are_not_there_are_refused_whatever_is_asked():
+    """Red: a table is read only where a name is looked up in it."""
+    for find in (gear.vessel, gear.line):
+        for text in (None, "60 t"):
+            with pytest.raises(BergtowError, match="nothere.csv"):
+                find(text, {}, "nothere.csv")
+    with pytest.raises(BergtowError, match="60 kg: is no bollard pull.*tug-60.*--vessels"):
+        gear.vessel("60 kg", {})
 
 
 def test_the_drag_of_another_coefficient_is_that_of_the_program(tmp_path):
