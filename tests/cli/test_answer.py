@@ -23,6 +23,7 @@ from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import extreme, largest
 from bergtow.stats import load as stat_load
+from bergtow.stats import loads as stat_loads
 from bergtow.stats import mean as stat_mean
 from bergtow.study import answer, assumed, gear, load_cases
 from bergtow.text import answer as words
@@ -380,6 +381,29 @@ def test_a_load_without_a_bound_is_at_least(tmp_path):
     e._events[1].append({"time_s": 100.0, "kind": "line_broken", "subject": 1, "value": 1.0})
     value = answer.value_of(e, c, found, [], None)
     assert (value["kind"], value["reason"], value["n"]) == ("at_least", "line_parted", 70.0)
+
+
+def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
+    """A load with a tail of shape 1: the answer names the largest, the statistics refuse the level with the same
+    words, and the answer carries their warnings. Red: the level of such a tail as the load to design for."""
+    e = ensemble(tmp_path, lambda rng: 60 + rng.pareto(1.0, size=600), n=6)
+    [row] = answer.conditions(e, time_scale=1.0)
+    assert row["value"]["kind"] == "largest_of_n" and row["value"]["reason"] == "unbounded_tail"
+    fields = stat_loads.gather(e, e.used, answer.options(time_scale=1.0))[0]["tow_force"][1]
+    assert row["value"]["n"] == max(f["peak"].max() for f in fields)
+    said = words.warnings({"conditions": [row]})
+    assert any("the sample does not know the tail" in text for text in said)
+
+
+def test_a_body_that_is_held_and_not_towed(tmp_path, monkeypatch, capsys):
+    """At a speed of zero there is no start, stop or bend. Red: a division by the speed."""
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    path = write_case(tmp_path, changed(CASE, tow={"mode": "speed", "speed": 0}))
+    cli.perform("design", path, "-o", tmp_path / "out", "--fields", "2", "--no-load-cases", "--no-pdf", "--no-replay",
+                "--quiet", "--vessel", "60 t")
+    found = json.loads((tmp_path / "out/answer.json").read_text())
+    assert [c["id"] for c in found["load_cases"]] == ["case.steady", "case.head_sea"] and found["ramp"] is None
+    assert "The tow needs" in capsys.readouterr().out
 
 
 def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):

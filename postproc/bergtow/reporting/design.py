@@ -19,6 +19,7 @@ width that the rule asks for: a load that rests on the periodic images of the bo
 of the question, and are left where they are.
 """
 import argparse
+import functools
 import math
 import os
 import re
@@ -271,10 +272,13 @@ def beside(work, a, row, t, minutes):
         def say(words):
             if not a.quiet:
                 print(words, flush=True)
-        start, ramp = load_cases.start(t, runs, say)
-        cases = [start, load_cases.head_sea(t, runs, a.head_current, a.head_wind),
-                 load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius), load_cases.stop(t),
-                 load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
+        cases, ramp, sea = [], None, functools.partial(load_cases.head_sea, t, runs, a.head_current, a.head_wind)
+        if t.speed > 0:
+            start, ramp = load_cases.start(t, runs, say)
+            cases = [start, sea(), load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius),
+                     load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
+        else:  # held, and not towed
+            cases = [sea()]
         ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
     return cases, ramp, ranges, runs.count
 
@@ -307,11 +311,10 @@ def answer_of(work, a, plan, began):
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
     cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - spent, "case_runs": count}
     found = writing.plain(answer.of(asked, plan, rows, cases, ramp, ranges, vessel, t, cost, title=e.title,
-                                    case=str(a.file), report="report.html", warnings=[]))
+                                    case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)
     print(f"\n{answer_text.text(found)}\n")
-    for remark in answer_text.remarks(found):
-        print(f"note: {remark}")
+    print("\n".join([*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]))
     print(a.output / "answer.json")
 
 
