@@ -19,7 +19,6 @@ width that the rule asks for: a load that rests on the periodic images of the bo
 of the question, and are left where they are.
 """
 import argparse
-import functools
 import math
 import os
 import re
@@ -272,14 +271,14 @@ def beside(work, a, row, t, minutes):
         def say(words):
             if not a.quiet:
                 print(words, flush=True)
-        cases, ramp, sea = [], None, functools.partial(load_cases.head_sea, t, runs, a.head_current, a.head_wind)
-        if t.speed > 0:
-            start, ramp = load_cases.start(t, runs, say)
-            cases = [start, sea(), load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius),
-                     load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
-        else:  # held, and not towed
-            cases = [sea()]
+        cases, ramp = [load_cases.head_sea(t, runs, a.head_current, a.head_wind)], None
+        towed = t.speed > 0  # or held
+        if towed:
+            cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
         ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+        if towed:  # the start last: its runs are the longest, and it has a closed form
+            start, ramp = load_cases.start(t, runs, say)
+            cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
     return cases, ramp, ranges, runs.count
 
 
