@@ -172,8 +172,8 @@ char *bt_simulation_case(const bt_simulation *s);
 /// What a file holds, by its keys: "case", "study", or "" of any other and of one that cannot be read.
 const char *bt_file_holds(const char *path);
 
-/// Read a number with a unit as in a case file; unit: SI symbol of its kind, "" for plain numbers. Errors:
-/// BT_ERR_USAGE.
+/// Read a number with a unit as in a case file; unit: SI symbol of its kind, "" for plain numbers, "%" for ratios.
+/// Errors: BT_ERR_USAGE.
 bt_status bt_number_read(const char *text, const char *unit, double *value);
 
 /// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json), or "limits": the numbers by which

@@ -1,15 +1,47 @@
 # SPDX-License-Identifier: MIT
 """Options that commands share, and kinds of numbers that options take."""
 import argparse
+import ctypes
 import math
 from pathlib import Path
 
+from bergtow import _library
 from bergtow.errors import USAGE, BergtowError
 from bergtow.writing import may_write
 
 
+def read(text, unit):
+    """A number with a unit as in a case: in the SI unit, "" for a plain number, "%" for a ratio. Errors:
+    BergtowError."""
+    value = ctypes.c_double()
+    _library.library().bt_number_read(text.strip().encode(), unit.encode(), ctypes.byref(value))
+    return value.value
+
+
+def measure(unit, fits=lambda x: x > 0, words="not above zero"):
+    """Type of an option with a unit, as of read(); of a length above zero by default."""
+    def number(text):
+        try:
+            return read(text, unit)
+        except BergtowError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+    return lambda text: _within(text, number, fits, words)
+
+
+def minutes(text):
+    """Minutes above zero: "90", "90 min", "1.5 h"."""
+    try:
+        float(text)
+    except ValueError:
+        return measure("s")(text) / 60
+    return above_zero(text)
+
+
 def _within(text, number, fits, words):
-    value = number(text)
+    try:
+        value = number(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text or 'nothing'} is no {'whole ' * (number is int)}number") from None
     if not fits(value):
         raise argparse.ArgumentTypeError(f"{text} is {words}")
     return value
@@ -31,8 +63,7 @@ def at_least_one(text):
     return _within(text, int, lambda x: x >= 1, "below 1")
 
 
-def share(text):
-    return _within(text, float, lambda x: 0 < x < 1, "not between 0 and 1")
+share = measure("%", lambda x: 0 < x < 1, "not between 0 and 1")
 
 
 def whole_from(least, most):

@@ -498,6 +498,7 @@ bt_status bt_number_read(const char *text, const char *unit, double *value)
     char why[BT_WHY];
     int kind = 0;
     while (kind < BT_UNIT_KINDS && strcmp(bt_units_symbol(kind), unit) != 0) kind++;
+    if (!strcmp(unit, "%")) kind = BT_UNIT_RATIO;
     if (kind == BT_UNIT_KINDS) bt_errors_add(&err, "%s: no SI unit of a key; see bergtow --list-keys", unit);
     else if (!bt_units_parse(text, kind, value, why)) bt_errors_add(&err, "%s: %s", text, why);
     return reported(err.n ? BT_ERR_USAGE : BT_OK, &err);

@@ -16,12 +16,14 @@ from harness import run as simulated
 
 import bergtow
 from bergtow import cli
+from bergtow.errors import BergtowError
 from bergtow.reporting import design
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import extreme, largest
 from bergtow.stats import load as stat_load
+from bergtow.stats import loads as stat_loads
 from bergtow.stats import mean as stat_mean
 from bergtow.study import answer, assumed, gear, load_cases
 from bergtow.text import answer as words
@@ -190,6 +192,35 @@ def test_forces_of_options(text, newtons):
     assert gear.force(text, "--vessel") == newtons
 
 
+@pytest.mark.parametrize("option, text, value", [
+    ("budget", "90", 90), ("budget", "1.5 h", 90), ("concentrations", "70 %,0.5", [0.5, 0.7]),
+    ("efficiency", "80 %", 0.8), ("efficiency", "1", 1), ("line-length", "0.5 km", 500),
+    ("head-current", "1 kn", 1852 / 3600),
+    ("bend", "90", math.pi / 2), ("bend", "-30 deg", -math.pi / 6), ("speeds", "1 m/s,0.5", [1.0, 0.5]),
+    ("budget", "3 kn", "a time"), ("concentrations", "97 %", "95 %"), ("efficiency", "1.2", "100 %"),
+    ("line-length", "3 kg", "length"), ("head-wind", "-1", "below zero"), ("bend", "400", "150 degrees"),
+    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"), ("speeds", "1 kn,", "a speed")])
+def test_options_take_units_and_say_what_is_wrong(option, text, value):
+    """Red: a bare float() as the type, whose message names a function of the program."""
+    words_of = ["design", "case.yml", f"--{option}={text}"]
+    if isinstance(value, str):
+        with pytest.raises(BergtowError, match=value) as error:
+            cli.tree("design").parse_args(words_of)
+        assert "invalid" not in str(error.value)
+    else:
+        assert getattr(cli.tree("design").parse_args(words_of), option.replace("-", "_")) == pytest.approx(value)
+
+
+def test_tables_that_are_not_there_are_refused_whatever_is_asked():
+    """Red: a table is read only where a name is looked up in it."""
+    for find in (gear.vessel, gear.line):
+        for text in (None, "60 t"):
+            with pytest.raises(BergtowError, match="nothere.csv"):
+                find(text, {}, "nothere.csv")
+    with pytest.raises(BergtowError, match="60 kg: is no bollard pull.*tug-60.*--vessels"):
+        gear.vessel("60 kg", {})
+
+
 def test_the_drag_of_another_coefficient_is_that_of_the_program(tmp_path):
     """Open water on the real binary with 0.85 and 1.25. Red: the friction under the body counted as form drag."""
     case = changed(TOW, ice__concentration=0.0, run__duration=6, output__window_start=3)
@@ -350,6 +381,29 @@ def test_a_load_without_a_bound_is_at_least(tmp_path):
     e._events[1].append({"time_s": 100.0, "kind": "line_broken", "subject": 1, "value": 1.0})
     value = answer.value_of(e, c, found, [], None)
     assert (value["kind"], value["reason"], value["n"]) == ("at_least", "line_parted", 70.0)
+
+
+def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
+    """A load with a tail of shape 1: the answer names the largest, the statistics refuse the level with the same
+    words, and the answer carries their warnings. Red: the level of such a tail as the load to design for."""
+    e = ensemble(tmp_path, lambda rng: 60 + rng.pareto(1.0, size=600), n=6)
+    [row] = answer.conditions(e, time_scale=1.0)
+    assert row["value"]["kind"] == "largest_of_n" and row["value"]["reason"] == "unbounded_tail"
+    fields = stat_loads.gather(e, e.used, answer.options(time_scale=1.0))[0]["tow_force"][1]
+    assert row["value"]["n"] == max(f["peak"].max() for f in fields)
+    said = words.warnings({"conditions": [row]})
+    assert any("the sample does not know the tail" in text for text in said)
+
+
+def test_a_body_that_is_held_and_not_towed(tmp_path, monkeypatch, capsys):
+    """At a speed of zero there is no start, stop or bend. Red: a division by the speed."""
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    path = write_case(tmp_path, changed(CASE, tow={"mode": "speed", "speed": 0}))
+    cli.perform("design", path, "-o", tmp_path / "out", "--fields", "2", "--no-load-cases", "--no-pdf", "--no-replay",
+                "--quiet", "--vessel", "60 t")
+    found = json.loads((tmp_path / "out/answer.json").read_text())
+    assert [c["id"] for c in found["load_cases"]] == ["case.steady", "case.head_sea"] and found["ramp"] is None
+    assert "The tow needs" in capsys.readouterr().out
 
 
 def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):

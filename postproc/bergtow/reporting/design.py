@@ -19,7 +19,6 @@ width that the rule asks for: a load that rests on the periodic images of the bo
 of the question, and are left where they are.
 """
 import argparse
-import ctypes
 import math
 import os
 import re
@@ -30,10 +29,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import _library, arguments, writing
+from bergtow import arguments, writing
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero, share
-from bergtow.errors import CASE, SIGNAL, BergtowError, RunError
+from bergtow.arguments import above_zero, at_least_one, measure, minutes
+from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
 from bergtow.result.members import FINISHED, WAITING, Members
@@ -55,6 +54,7 @@ MARGIN = 0.95                # of what is left is given to fields
 FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
+BENDS = math.radians(1), math.radians(150)  # of the course change: what a body on a line can follow, assumed
 FEW = 5                      # fields below which nothing is known of the scatter between them
 CASES_SHARE, CASE_RUNS = 0.4, 34  # of the budget for load cases and ranges, at most, and how many runs these are
 SLOWER = 1.6                 # a run / the program's own estimate of it: where the first fields are still to come
@@ -271,11 +271,14 @@ def beside(work, a, row, t, minutes):
         def say(words):
             if not a.quiet:
                 print(words, flush=True)
-        start, ramp = load_cases.start(t, runs, say)
-        cases = [start, load_cases.head_sea(t, runs, a.head_current, a.head_wind),
-                 load_cases.course_change(t, runs, a.bend, a.bend_radius), load_cases.stop(t),
-                 load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
+        cases, ramp = [load_cases.head_sea(t, runs, a.head_current, a.head_wind)], None
+        towed = t.speed > 0  # or held
+        if towed:
+            cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
         ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+        if towed:  # the start last: its runs are the longest, and it has a closed form
+            start, ramp = load_cases.start(t, runs, say)
+            cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
     return cases, ramp, ranges, runs.count
 
 
@@ -307,36 +310,22 @@ def answer_of(work, a, plan, began):
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
     cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - spent, "case_runs": count}
     found = writing.plain(answer.of(asked, plan, rows, cases, ramp, ranges, vessel, t, cost, title=e.title,
-                                    case=str(a.file), report="report.html", warnings=[]))
+                                    case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)
     print(f"\n{answer_text.text(found)}\n")
-    for remark in answer_text.remarks(found):
-        print(f"note: {remark}")
+    print("\n".join([*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]))
     print(a.output / "answer.json")
 
 
 # ---- command line
 
 
+concentration = measure("%", lambda x: 0 <= x <= 0.95, "not from 0 to 95 %; give concentrations as in 0.6,0.8")
+speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" or 0.8kn:1.4kn:4")
+
+
 def concentrations(text):
-    try:
-        values = sorted({float(part) for part in text.split(",")})
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: give numbers with commas, as in 0.6,0.8") from None
-    if not all(0 <= v <= 0.95 for v in values):
-        raise argparse.ArgumentTypeError(f"{text}: concentrations are 0 to 0.95")
-    return values
-
-
-def speed(text):
-    value = ctypes.c_double()
-    try:
-        _library.library().bt_number_read(text.strip().encode(), b"m/s", ctypes.byref(value))
-    except BergtowError:
-        raise argparse.ArgumentTypeError(f"{text}: give speeds as in 0.8 kn,1 kn or 0.8 kn:1.4 kn:4") from None
-    if not 0 < value.value < np.inf:
-        raise argparse.ArgumentTypeError(f"{text}: speeds are above zero")
-    return value.value
+    return sorted({concentration(part) for part in text.split(",")})
 
 
 def speeds(text):
@@ -354,31 +343,35 @@ def options(p):
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
                    "where an earlier one ended")
-    p.add_argument("--budget", type=above_zero, metavar="MIN",
+    p.add_argument("--budget", type=minutes, metavar="MIN",
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
     p.add_argument("--concentrations", type=concentrations, metavar="A,...", help="of a case (default: its own)")
     p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
     p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
-    p.add_argument("--line-length", type=above_zero, metavar="M", help="its length, for snap loads (default: that of "
-                   "the case)")
+    p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
+                   "of the case)")
     p.add_argument("--line-factor", type=above_zero, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
-    p.add_argument("--efficiency", type=share_of_one, default=1.0, metavar="X", help="share of the bollard pull that "
+    p.add_argument("--efficiency", type=measure("%", lambda x: 0 < x <= 1, "not above 0 and up to 100 %"),
+                   default=1.0, metavar="X", help="share of the bollard pull that "
                    "the vessel tows with in the weather (default: 1)")
     for kind in ("vessels", "lines"):
         p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
     p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
                    "parameters of a study (default: a few with their sources)")
-    p.add_argument("--head-current", type=not_below_zero, metavar="V", help="against the tow, m/s, in the load case "
-                   f"with head current and wind (default: {load_cases.HEAD_CURRENT:g}, assumed, and then not in the "
-                   "design value)")
-    p.add_argument("--head-wind", type=not_below_zero, metavar="V", help="the same of the wind, m/s (default: "
-                   f"{load_cases.HEAD_WIND:g})")
-    p.add_argument("--bend", type=finite, default=answer.BEND, metavar="DEG", help="angle of the course change, "
-                   "degrees (default: %(default)s, assumed)")
-    p.add_argument("--bend-radius", type=above_zero, metavar="M", help="its radius, m (default: ten body lengths, "
+    against = measure("m/s", lambda x: x >= 0, "below zero")
+    p.add_argument("--head-current", type=against, metavar="V", help="against the tow, in the load case with head "
+                   f"current and wind (default: {load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design "
+                   "value)")
+    p.add_argument("--head-wind", type=against, metavar="V", help="the same of the wind (default: "
+                   f"{load_cases.HEAD_WIND:g} m/s)")
+    p.add_argument("--bend", type=measure("rad", lambda x: BENDS[0] <= abs(x) <= BENDS[1], "not from 1 to "
+                                          "150 degrees, to either side"),
+                   default=math.radians(answer.BEND), metavar="DEG", help="angle of the course change, degrees "
+                   f"(default: {answer.BEND:g}, assumed)")
+    p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="its radius (default: ten body lengths, "
                    "assumed)")
     p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms alone")
     domain_width.add_option(p)
@@ -398,10 +391,6 @@ def options(p):
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
     arguments.add_force(p)
-
-
-def share_of_one(text):
-    return 1.0 if float(text) == 1 else share(text)
 
 
 def ending(a, began, conditions):

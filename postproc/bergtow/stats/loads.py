@@ -29,7 +29,7 @@ from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.table import quantity
+from bergtow.table import bound, quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -182,10 +182,15 @@ def gather(e, rows, options):
 
 
 def _design(found, hours, total):
-    """The level of the last return time by peaks over a threshold, or by block maxima where there are too few."""
+    """The level of the last return time by peaks over a threshold, or by block maxima where there are too few. One
+    whose interval bounds nothing (table.bound) is none: the sample does not know the tail, and such a level has been a
+    hundred times the largest load simulated."""
     for kind, model in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
         level = found[kind].get("levels", [{"level": np.nan}])[-1]
         if np.isfinite(level["level"]):
+            if np.isinf(bound(level["level"], level["level_95"][1])):
+                return {"refused": "the sample does not know the tail: the interval of its level has no upper bound; "
+                                   "run more fields", "return_hours": hours, "unbounded": True}
             return {
                 "value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
                 "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),

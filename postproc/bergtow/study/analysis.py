@@ -8,7 +8,6 @@ The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure
 import os
 
 from bergtow import arguments, writing
-from bergtow.arguments import above_zero
 from bergtow.errors import RunError
 from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
@@ -24,16 +23,12 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
 
 def add_options(p, minutes):
     """--budget, --set, --jobs, --force."""
-    p.add_argument("--budget", type=above_zero, default=minutes, metavar="MIN",
+    p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",
                    help=f"wall time, min (default {minutes:g}); the same call goes on")
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=_jobs, default=len(os.sched_getaffinity(0)), metavar="N",
+    p.add_argument("--jobs", type=arguments.at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")
     arguments.add_force(p)
-
-
-def _jobs(text):
-    return max(1, int(text))
 
 
 def _files(name, folder):

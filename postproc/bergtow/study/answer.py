@@ -18,6 +18,7 @@ from types import SimpleNamespace
 from bergtow import table
 from bergtow.result.members import FINISHED
 from bergtow.result.run import Run, case_value, parse_case
+from bergtow.stats import conditions as stat_conditions
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import largest as stat_largest
 from bergtow.stats import load as stat_load
@@ -77,9 +78,10 @@ def case_numbers(program, path, given):
 
 
 def options(**more):
-    """Those of the statistics of loads, as bergtow statistics has them."""
+    """Those of the statistics, as bergtow statistics has them, without p-values."""
     return SimpleNamespace(**({"time_scale": None, "tow_hours": None, "probability": stat_loads.PROBABILITY,
-                               "hours": [], "resamples": 1} | more))
+                               "hours": [], "resamples": 1, "error": 0.05, "gap": None, "blocks": None,
+                               "threshold": None} | more))
 
 
 def value_of(e, c, found, fields, some):
@@ -100,7 +102,7 @@ def value_of(e, c, found, fields, some):
         return {"kind": "return_level", "n": d["value"], "interval_95": [low, table.bound(d["value"], high)],
                 "model": d["model"], "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
     largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])
-    return {"kind": "largest_of_n", **largest, "reason": "no_tail"}
+    return {"kind": "largest_of_n", **largest, "reason": "unbounded_tail" if d.get("unbounded") else "no_tail"}
 
 
 def windy(case):
@@ -126,7 +128,8 @@ def condition(e, c, k, o):
     """The row of a steady tow."""
     gathered, why = stat_loads.gather(e, c.finished, o) if len(c.finished) else ({}, {})
     tow = gathered.get("tow_force")
-    found = stat_loads.statistics(e, c.finished, o, {"tow_force": tow})["tow_force"] if tow else None
+    s = stat_conditions.condition(e, c, {m: stat_conditions.member(e, m) for m in c.finished}, o)
+    found = s["loads"].get("tow_force")
     means = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))[c.finished]
     means = means[np.isfinite(means)]
     constant = float(means.mean()) if "tow_force" in why and len(means) else None
@@ -142,7 +145,8 @@ def condition(e, c, k, o):
                  "interval_95": stat_mean.t_interval(means)},
         "parts": [{"id": f"{name}.{part}", "part": part, "n": n, "share": n / value["n"] if value["n"] else np.nan}
                   for part, n in parts.items()],
-        "start_up": start and start["largest"], "doubts": sorted({d for m in c.finished for d in e.doubts(m)})}
+        "start_up": start and start["largest"], "doubts": sorted({d for m in c.finished for d in e.doubts(m)}),
+        "warnings": s["design"]["warnings"]}
 
 
 def with_speed(row, e, c):
@@ -242,7 +246,7 @@ def feasible(some, asked, v, efficiency, t):
         return out | {"reason": "no_speed_is_feasible"}
     last = some[-1]
     limit = gear.limit_by_drag(v, efficiency, last["speed_m_s"], last["needs_n"],
-                               (t.water + t.wind) * (last["speed_m_s"] / t.speed) ** 2) if t else None
+                               (t.water + t.wind) * (last["speed_m_s"] / t.speed) ** 2) if t and t.speed > 0 else None
     return out | {"not_above_m_s": limit, "by": limit and "drag_alone"}
 
 

@@ -15,16 +15,13 @@ line that may part; a prescribed speed is kept whatever it takes. The search is 
 tried is a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where
 periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
 """
-import argparse
-import ctypes
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bergtow import _library
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, whole_from
+from bergtow.arguments import measure, read, whole_from
 from bergtow.errors import CASE, USAGE, BergtowError, RunError
 from bergtow.result import at_least, compared
 from bergtow.result.run import Run, case_value, parse_case, within
@@ -296,11 +293,7 @@ def check(case, key):
         raise RunError(key, "the fields are its values already", "search another key", USAGE)
 
 
-def share(text):
-    value = above_zero(text)
-    if not 0.05 <= value <= 0.95:
-        raise argparse.ArgumentTypeError(f"{text} is not from 0.05 to 0.95")
-    return value
+share = measure("%", lambda x: 0.05 <= x <= 0.95, "not from 0.05 to 0.95")
 
 
 def options(p):
@@ -328,12 +321,10 @@ def options(p):
 
 def number(option, text, unit):
     """A number of an option with a unit, read as the program reads it. Errors: RunError."""
-    value = ctypes.c_double()
     try:
-        _library.library().bt_number_read(text.encode(), unit.encode(), ctypes.byref(value))
+        return read(text, unit)
     except BergtowError as error:
         raise BergtowError(f"{option} {error}", USAGE) from None
-    return value.value
 
 
 def check_options(a):

@@ -7,12 +7,11 @@ or a breaking load. What neither the call nor the case says is assumed, and name
 efficiency of the vessel and the safety factor of the line are the user's: no clause of a standard could be read, so
 none is applied unless it is given.
 """
-import ctypes
-import math
 import re
 from dataclasses import dataclass
 
-from bergtow import _library, towing
+from bergtow import towing
+from bergtow.arguments import read
 from bergtow.errors import USAGE, BergtowError
 from bergtow.result.run import case_value
 
@@ -43,22 +42,28 @@ class Line:
 def force(text, option):
     """N of "110 t" (tonnes-force), "1.1 MN"; None where the text is no number with such a unit. Errors: BergtowError
     where it is none above zero."""
-    tonnes = re.fullmatch(r"\s*([\d.]+)\s*(?:t|tf|tonnes?)\s*", text)
-    value = ctypes.c_double()
+    tonnes = re.sub(r"(?<=[\d.\s])(t|tonnes?)\s*$", "tf", text)
     try:
-        if tonnes:
-            value.value = TONNE * float(tonnes[1])
-        else:
-            _library.library().bt_number_read(text.encode(), b"N", ctypes.byref(value))
-    except (BergtowError, ValueError):
+        value = read(tonnes, "N")
+    except BergtowError:
         return None
-    if not (math.isfinite(value.value) and value.value > 0):
+    if not value > 0:
         raise BergtowError(f"{option} {text}: is not above zero; give it as \"110 t\" or \"1.1 MN\"", USAGE)
-    return value.value
+    return value
+
+
+def known(table, text, option, what):
+    """A row of the library. Errors: BergtowError."""
+    if text not in table:
+        raise BergtowError(f"{option} {text}: is no {what}, as \"110 t\" or \"1.1 MN\", and none of {', '.join(table)}; "
+                           f"name one of these, or add a table of your own with {option}s", USAGE)
+    return table[text]
 
 
 def vessel(text, case, library=None):
-    """The vessel of the call (text or None), or that of the case. Errors: BergtowError."""
+    """The vessel of the call (text or None), or that of the case. Errors: BergtowError, of a library that is not asked,
+    too."""
+    table = towing.vessels(library)
     own = {k: case_value(case, f"tow.vessel.{k}", 0.0) for k in ("bollard_pull", "free_speed", "mass")}
     thrust = case.get("tow.mode") == "thrust"
     free, free_from = (own["free_speed"], "case") if thrust and own["free_speed"] > 0 else (FREE_SPEED, "assumed")
@@ -69,15 +74,16 @@ def vessel(text, case, library=None):
     pull = force(text, "--vessel")
     if pull is not None:
         return Vessel(text, pull, free, free_from, np.nan, mass)
-    found = towing.find_vessel(text, library)
-    known = np.isfinite(found.free_speed)
-    return Vessel(found.name, found.bollard_pull, found.free_speed if known else free,
-                  "library" if known else free_from, found.beam, found.mass if np.isfinite(found.mass) else mass)
+    found = known(table, text, "--vessel", "bollard pull")
+    own_speed = np.isfinite(found.free_speed)
+    return Vessel(found.name, found.bollard_pull, found.free_speed if own_speed else free,
+                  "library" if own_speed else free_from, found.beam, found.mass if np.isfinite(found.mass) else mass)
 
 
 def line(text, case, library=None, own_length=None):
     """The line of the call (text or None), or that of the case; own_length, m, in place of the case's. Errors:
-    BergtowError."""
+    BergtowError, as above."""
+    table = towing.lines(library)
     there = case.get("tow.mode") in ("line", "thrust")
     number = lambda key: case_value(case, key, np.nan) if there else np.nan
     length, stiffness = own_length or number("tow.line_length"), number("tow.line_stiffness")
@@ -87,7 +93,7 @@ def line(text, case, library=None, own_length=None):
     load = force(text, "--line")
     if load is not None:
         return Line(text, load, stiffness, length)
-    found = towing.find_line(text, library)
+    found = known(table, text, "--line", "breaking load")
     return Line(found.name, found.breaking, found.stiffness, length)
 
 

@@ -8,7 +8,8 @@ the mean ice resistance, F the design value of the steady tow, k = EA/L of the l
     start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
                      than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that
                      ramp, and with shorter ones as long as these hold, show what the ice makes of it
-    course change    along the course as in runs through a bend of radius r, across it M V^2/r: the root of the squares
+    course change    on a line its tension in runs through a bend of radius r; else along the course as in such runs,
+                     across it M V^2/r: the root of the squares
     stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
     loss of thrust   the body goes on by  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if ice and water
                      alone stop it; where the line is taken up again at a relative speed of V, which bounds it, the load
@@ -126,10 +127,10 @@ def mean_parts(run):
             "drag": run.number("mean_drag_force_n")}
 
 
-def largest_mean(run, scale, start, end):
-    """Largest mean over `scale` of the tow force between two times, N; NaN where there is none."""
+def largest_mean(run, scale, start, end, name="tow_force"):
+    """Largest mean over `scale` of the tow force, or of another load, between two times, N; NaN where there is none."""
     some, time = stat_loads.of_run(run)
-    x = next((x for load, x in some if load.name == "tow_force"), None)
+    x = next((x for load, x in some if load.name == name), None)
     if x is None:
         return np.nan
     there = within(time, start, end)
@@ -191,8 +192,10 @@ def loss_of_thrust(t):
     distance, time = coasting(t)
     values = {"coasts_m": distance, "coasts_s": time, "line_m": t.line.length}
     if not np.isfinite(t.spring):
-        return none("loss_of_thrust", "line_not_known", by="closed_form", acts_on="line", formula="coasting",
-                    values=values)
+        known = [np.isfinite(t.line.stiffness), t.line.length > 0]
+        reason = {(True, False): "line_length_not_known", (False, True): "line_stiffness_not_known"}.get(
+            tuple(map(bool, known)), "line_not_known")
+        return none("loss_of_thrust", reason, by="closed_form", acts_on="line", formula="coasting", values=values)
     heavy = towing.effective_mass(t.mass, t.vessel_mass if np.isfinite(t.vessel_mass) else np.inf)
     snap = towing.snap_load(t.speed, t.spring, heavy, static=t.mean)
     return row("loss_of_thrust", snap, "bound", "closed_form", "line", formula="snap_load",
@@ -260,35 +263,47 @@ def start(t, runs, say):
                              "mass_kg": t.mass, "tried": tried}), ramp
 
 
+def inside(case, place, margin):
+    """Does a place, [x, y], keep this distance, m, from the ends and sides that the domain has?"""
+    first, size = ([case_value(case, f"domain.{key}") for key in keys] for keys in (("x0", "y0"), ("length", "width")))
+    return all(case.get(f"domain.{kind}") in ("periodic", "moving") or a + margin <= at <= a + b - margin
+               for kind, at, a, b in zip(("ends", "sides"), place, first, size))
+
+
 def course_change(t, runs, degrees, radius):
-    """Through a bend."""
+    """Through a bend. On a line the towing end leads by its length, so that the bend begins as far ahead, and the
+    tension holds the body in the bend, too; a body whose speed is prescribed is held across by no series."""
     if t.case.get("tow.waypoints", "none") != "none" or t.case.get("tow.programme", "none") != "none":
         return none("course_change", "case_has_path")
-    if t.case.get("tow.mode") != "speed":
-        return none("course_change", "needs_mode_speed")
     r = radius or BEND_WIDTHS * t.width
+    on_line = t.case.get("tow.mode") != "speed"
+    ahead = case_value(t.case, "tow.hull_x", 0.0) + case_value(t.case, "tow.line_length", 0.0) if on_line else 0.0
+    tension = on_line and t.case.get("tow.line.branches", "1") == "1"
     angle, settle = math.radians(degrees), SETTLE / t.slower
     x, y = (float(t.case[f"body.{k}"].split()[0]) for k in "xy")
-    first = t.speed * (t.case_ramp / 2 + settle) + r * math.tan(angle / 2)
-    last = t.speed * settle + r * math.tan(angle / 2)
+    tangent = r * math.tan(abs(angle) / 2)
+    first = t.speed * (t.case_ramp / 2 + settle) + tangent
+    last = t.speed * settle + tangent
     d = [np.array([math.cos(t.direction + a), math.sin(t.direction + a)]) for a in (0.0, angle)]
-    corner = np.array([x, y]) + first * d[0]
+    corner = np.array([x, y]) + (ahead + first) * d[0]
     end = corner + last * d[1]
-    way = first + last - 2 * r * math.tan(angle / 2) + r * angle
-    if way > t.distance:
+    way = first + last - 2 * tangent + r * abs(angle) + ahead
+    if way > t.distance or not inside(t.case, end, t.width / 2):
         return none("course_change", "domain_too_short", values={"way_m": way, "radius_m": r, "angle_deg": degrees})
     duration = t.case_ramp / 2 + way / t.speed
     sets = {"tow.waypoints": f"[[{corner[0]:.9g}, {corner[1]:.9g}], [{end[0]:.9g}, {end[1]:.9g}]]",
             "tow.turn_radius": f"{r:.9g} m", "run.duration": f"{duration:.9g} s",
             "output.window_start": f"{t.case_ramp + settle / 2:.9g} s"}
-    values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius), "across_n": t.mass * t.speed ** 2 / r}
+    values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius),
+              "across_n": 0.0 if tension else t.mass * t.speed ** 2 / r}
     if reason := runs.make("course-change", sets, runs.few):
         return none("course_change", reason, set=sets, values=values)
     begin = t.case_ramp + settle
-    along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2),
-                              runs.few))
+    load = f"{stat_loads.TENSION}1" if tension else "tow_force"
+    along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2,
+                                                                        load), runs.few))
     return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.few),
-               set=sets, formula="hypot", values=values | {"along_n": along})
+               set=sets, formula="tension" if tension else "hypot", values=values | {"along_n": along})
 
 
 def with_steady(t, n, ends, r):

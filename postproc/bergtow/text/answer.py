@@ -3,7 +3,8 @@
 back from answer.json, where what is not finite is None."""
 import math
 
-from bergtow.table import designed, number, short, table
+from bergtow.table import designed, level, number, short, table
+from bergtow.text import loads as loads_text
 
 KNOT = 1852 / 3600
 TONNE = 9806.65
@@ -19,13 +20,15 @@ KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at
          "constant": "does not vary", "none": "–"}
 #: what stands for the code of a reason
 REASONS = {
-    "no_tail": "too few peaks for a tail", "no_window": "no window that is long enough", "no_member": "no run",
+    "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above", "no_window": "no window that is long enough", "no_member": "no run",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
     "budget": "the budget was spent", "run_failed": "the run failed", "domain_too_short": "the domain is too short",
     "case_has_path": "the case has a path of its own: it is in the steady tow",
-    "case_has_programme": "the case has a programme of its own", "needs_mode_speed": "for tow.mode: speed alone",
+    "case_has_programme": "the case has a programme of its own",
     "environment_from_table": "the case has current or wind from a table",
-    "line_not_known": "stiffness and length of the line are not known", "single_line_tow_is_lost": "the tow is lost",
+    "line_not_known": "stiffness and length of the line are not known: give --line and --line-length",
+    "line_length_not_known": "the length of the line is not known: give --line-length",
+    "line_stiffness_not_known": "the stiffness of the line is not known: name one of the library with --line", "single_line_tow_is_lost": "the tow is lost",
     "value_not_above_mean": "the value is not above the mean", "no_ramp_held": "no ramp that was tried holds",
     "left_out": "left out"
 }
@@ -49,11 +52,12 @@ def force(n):
     return f"{number(designed(n) / 1e3)} kN" if known(n) else "no value"
 
 
-def ends(interval, to="to"):
-    """"620 to 700"; "" without an interval."""
+def ends(n, interval):
+    """"620 to 700", the interval of a load n in kN, with the digits that it is worth, as in the report; "" without
+    one."""
     if interval is None or interval[0] is None:
         return ""
-    return f"{kn(interval[0])} {to} {kn(interval[1]) if interval[1] is not None else 'no bound'}"
+    return level(n, [math.inf if x is None else x for x in interval], 1e3)[1]
 
 
 def speed(v):
@@ -81,8 +85,11 @@ def _in_case(v):
 
 
 def _needs(v, a):
-    interval = f" ({ends(v['interval_95'])}, 95 % of the fields)" if ends(v["interval_95"]) else ""
-    return f"The tow needs {force(v['n'])}{interval} {_over(a)}{_in_case(v)}"
+    interval = ends(v["n"], v["interval_95"])
+    exceeded = f", which {percent(a['asked']['probability'])} of tows of {short(a['asked']['tow_hours'], 2)} h exceed" \
+        if v["kind"] == "return_level" else ""
+    return (f"The tow needs {force(v['n'])}{f' (95 % interval over fields: {interval} kN)' if interval else ''} "
+            f"{_over(a)}{_in_case(v)}{exceeded}")
 
 
 def _largest(v, a):
@@ -90,7 +97,9 @@ def _largest(v, a):
 
 
 def _covers(v, a):
-    return (f"There are too few peaks for a tail: the largest of {v['n_tows']} steady tows of "
+    why = {"no_tail": "There are too few peaks for a tail",
+           "unbounded_tail": "These fields do not know the tail, whose interval has no upper bound"}[v["reason"]]
+    return (f"{why}: the largest of {v['n_tows']} steady tows of "
             f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence "
             f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
             f"{short(a['asked']['tow_hours'], 2)} h bears more")
@@ -106,9 +115,9 @@ def _band(v, a):
     out = f"Over the ranges of what is assumed the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
     drag = next((r for r in a["assumed"] if r["key"] == "body.drag.water_form" and known(r["n_per_tenth"])), None)
     if drag:
-        out += f"; a tenth of the water's drag coefficient is {kn(drag['n_per_tenth'])} kN"
+        out += f"; each 10 % of the water's drag coefficient is worth {kn(drag['n_per_tenth'])} kN"
     if v["combined_95"]:
-        out += f"; fields and ranges together: {ends(v['combined_95'])} kN (95 %)"
+        out += f"; fields and ranges together: {ends(a['load_cases'][0]['n'], v['combined_95'])} kN (95 %)"
     return out
 
 
@@ -126,27 +135,29 @@ def _line(v, a):
     if v["row"] and v["row"] != a["design"]["row"]:
         out += f", by the load case \"{CASES[v['row']]}\""
     if known(v["utilisation"]):
-        out += f"; the line named is used to {percent(v['utilisation'])}"
+        out += f"; that is {percent(v['utilisation'])} of the breaking load of the line named"
     return out
 
 
 def _feasible(v, a):
-    words = {"yes": "feasible", "no": "not feasible", "open": "not decided by the interval"}[v["verdict"]]
-    out = f"With the vessel named the tow is {words} at {speed(v['speed_m_s'])}"
+    at = speed(v["speed_m_s"])
+    out = {"yes": f"The vessel named can tow at {at}", "no": f"The vessel named cannot tow at {at}",
+           "open": f"Whether the vessel named can tow at {at} is open, since its pull lies within the interval"
+           }[v["verdict"]]
     if known(v["not_above_m_s"]):
-        by = ", by the drag alone, with the load of the ice held (assumed)" if v["by"] == "drag_alone" else ""
-        out += f", and not above {speed(v['not_above_m_s'])}{by}"
+        by = ", if the drag alone grows with the speed (assumed)" if v["by"] == "drag_alone" else ""
+        out += f"{'; it can' if v['verdict'] == 'no' else ', and'} up to {speed(v['not_above_m_s'])}{by}"
     return out
 
 
 def _start(v, a):
     if not known(v["s"]):
         return "No ramp makes the start harmless: the value is not above the mean"
-    out = f"It sets off within {force(v['n'])} with a ramp of {minutes(v['s'])}"
+    out = f"With a ramp of {minutes(v['s'])} the start takes {force(v['n'])}"
     out += {"runs": "" if v["verified"] else ", the least of those tried",
             "closed_form": ", by the closed form: no run has confirmed it"}[v["by"]]
     if known(v["case_n"]) and known(a["design"]["n"]) and v["case_n"] > a["design"]["n"]:
-        out += f"; the ramp of the case, {minutes(v['case_s'])}, takes {force(v['case_n'])}"
+        out += f"; with that of the case, {minutes(v['case_s'])}, it takes {force(v['case_n'])}"
     return out
 
 
@@ -186,8 +197,8 @@ def _behind(row):
             said.append(words.format(v[key], short(v[key]), minutes(v[key])))
     add("ramp_s", "ramp {2}")
     add("slack_below_s", "line slack if stopped in less than {2}")
-    add("coasts_m", "goes on for {1} m")
-    add("coasts_s", "{2}")
+    add("coasts_m", "the body drifts on for {1} m")
+    add("coasts_s", "in {2}")
     add("relative_speed_m_s", "taken up at {1} m/s")
     add("angle_deg", "{1} deg")
     add("radius_m", "radius {1} m")
@@ -202,10 +213,10 @@ def _behind(row):
 def load_cases(a, markdown):
     top = (a["design"] or {}).get("row")
     rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
-             ends(c["interval_95"]) or "–", KINDS[c["kind"]],
+             ends(c["n"], c["interval_95"]) or "–", KINDS[c["kind"]],
              {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
               "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
-    return table(["load case", "kN", "95 % of the fields", "kind", "by", "with"], rows, markdown) + \
+    return table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows, markdown) + \
         ("\n\n* design value" if top else "") + \
         ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "")
 
@@ -232,9 +243,9 @@ def assumed(a, markdown):
 
 
 def speeds(a, markdown):
-    rows = [[speed(s["speed_m_s"]), kn(s["needs_n"]), ends(s["interval_95"]) or "–", kn(s["has_n"]),
-             s["feasible"].replace("_", " ")] for s in a["speeds"]]
-    return table(["speed", "needs kN", "95 % of the fields", "vessel kN", "feasible"], rows, markdown)
+    rows = [[speed(s["speed_m_s"]), kn(s["needs_n"]), ends(s["needs_n"], s["interval_95"]) or "–", KINDS[s["kind"]],
+             kn(s["has_n"]), s["feasible"].replace("_", " ")] for s in a["speeds"]]
+    return table(["speed", "needs kN", "95 % interval", "kind", "vessel kN", "feasible"], rows, markdown)
 
 
 def plan(p):
@@ -274,4 +285,11 @@ def remarks(answer):
         out.append(f"the free-running speed of the vessel is assumed, {speed(v['free_speed_m_s'])}")
     if answer["line"]["factor"] is None:
         out.append("the line has no safety factor: name one with --line-factor")
-    return out + [w["text"] for w in answer.get("warnings", []) if w.get("text")]
+    return out
+
+
+def warnings(answer):
+    """Those of the statistics, as bergtow statistics has them: "WARNING: ..."."""
+    return loads_text.warnings({"conditions": [
+        {"label": c["label"], "design": {"tow": {"value": c["value"]["n"] or 0.0}, "warnings": c["warnings"]}}
+        for c in answer["conditions"]]})
