@@ -22,22 +22,23 @@
 // each nowhere narrower than that, has none: one of them has no chord parallel to the section longer than it, and the
 // width of a convex body is at most its longest chord of any direction.
 //
-// Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid, and
-// loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here:
+// Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
+// and loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here:
 //     |N| ≤ G + |T| √(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
 //         |S1| = |S2|, so each is at most half of ∫ r dA ≤ √(A J).
 //     |M| ≤ (R + e) G + |T| (1 + e √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
 //         (R + e)(G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
-// A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the centroid
-// and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a point that is
-// cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the triangle of both
-// has the section, on which it is f c long. If the line from Q through m meets c, then |Q m| ≤ f D. If not, m is beside
-// the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2. So |Q m| ≤ d with
-// d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area, and
+// A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the
+// centroid and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a
+// point that is cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the
+// triangle of both has the section, on which it is f c long. If the line from Q through m meets c, then |Q m| ≤ f D.
+// If not, m is beside the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2.
+// So |Q m| ≤ d with d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area,
+// and
 //     |N| ≤ G + s (G + |T| R A/J),   |M| ≤ d (G + s (G + |T| R A/J))
 // Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
-// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises: between
-// two lengths each is taken where it is largest.
+// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises:
+// between two lengths each is taken where it is largest.
 #include "split/find.h"
 #include "base/elementary.h"
 

@@ -205,8 +205,8 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
     add(to, &r);
 }
 
-/// Upper bound of the forces that a contact puts on a floe, opening ones with them, N. A wedge opens no more than a flat
-/// corner would, by 1/(2 μ).
+/// Upper bound of the forces that a contact puts on a floe, opening ones with them, N. A wedge opens no more than one
+/// without an angle would, 1/(2 μ) of the normal force.
 static double most_of(const bt_world *w, const bt_contact *u)
 {
     const double total = u->ln[0] + u->ln[1];
@@ -283,8 +283,8 @@ static void add_cells(bt_world *w, pass what, load_list *to)
 
 static double size_of(const bt_floe_load *l) { return bt_hypot(l->fx, l->fy) + l->opening; }
 
-/// Does body i surely bear loads of this sum, N? What it bears follows from outline, thickness and strength, which an id
-/// has for ever.
+/// Does body i surely bear loads of this sum, N? What it bears follows from outline, thickness and strength, which an
+/// id has for ever.
 static bool is_borne(const bt_world *w, bt_idx i, double sum)
 {
     bt_splitting *s = w->splitting;
