@@ -76,6 +76,18 @@ static inline bool bt_bodies_slide(const bt_bodies *a, bt_idx i, const bt_bodies
     return bt_bodies_sheet(a, i, towed) && bt_bodies_sheet(b, j, towed) && deck * bt_max(h, g) <= bt_min(h, g);
 }
 
+/// Coefficients of the pair (i, j), gid[i] < gid[j]: those of j (bergtow/world.h).
+static inline double bt_pair_friction(const bt_bodies *b, bt_idx i, bt_idx j)
+{
+    (void)i;
+    return b->friction[j];
+}
+static inline double bt_pair_restitution(const bt_bodies *b, bt_idx i, bt_idx j)
+{
+    (void)i;
+    return b->restitution[j];
+}
+
 /// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.
 static inline double bt_into_period(double x, double low, double period, int32_t *laps)
 {

@@ -3,7 +3,7 @@
 #ifndef BT_GATHER_H
 #define BT_GATHER_H
 
-#include "output/record.h"
+#include "output/frame.h"
 #include "output/roster.h"
 #include "bergtow/world.h"
 

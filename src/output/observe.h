@@ -3,7 +3,8 @@
 #ifndef BERGTOW_OBSERVE_H
 #define BERGTOW_OBSERVE_H
 
-#include "output/record.h"
+#include "output/sample.h"
+#include "bergtow/comm.h"
 #include "output/roster.h"
 #include "bergtow/world.h"
 

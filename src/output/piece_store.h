@@ -14,7 +14,7 @@
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/xdmf.h"
-#include "output/record.h"
+#include "output/frame.h"
 #include "output/roster.h"
 
 struct bt_splitting;

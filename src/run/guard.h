@@ -40,7 +40,7 @@
 #define BT_GUARD_H
 
 #include "bergtow/case.h"
-#include "output/record.h"
+#include "output/sample.h"
 #include "output/roster.h"
 #include "bergtow/world.h"
 

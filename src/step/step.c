@@ -158,12 +158,10 @@ static void balance_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
         bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
         bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
         bt_sum_add(&t->sum[UNSOLVED], bt_contacts_unsolved_work(u, w->stats.residual));
-        const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
-        if (sign == 0) continue;
         double jx, jy;
-        bt_impulse_on_b(u, &jx, &jy);
-        bt_sum_add(&t->sum[APPLIED_X], sign * jx);
-        bt_sum_add(&t->sum[APPLIED_Y], sign * jy);
+        if (!bt_impulse_from_outside(u, b->inv, &jx, &jy)) continue;
+        bt_sum_add(&t->sum[APPLIED_X], jx);
+        bt_sum_add(&t->sum[APPLIED_Y], jy);
     }
     bt_sum_add(&t->sum[POINTS], (double)cell->n_points);
     t->most = bt_max(t->most, cell->overlap);
