@@ -7,7 +7,7 @@
 #include "bergtow/comm.h"
 #include "base/json.h"
 #include "case/arch.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/cost.h"
 #include "case/warning.h"
 

@@ -10,6 +10,7 @@
 #include "bergtow/world.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "case/cost.h"

@@ -27,6 +27,10 @@ const char *bt_state_not_finite(const bt_world *w, char name[64]);
 bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 void bt_state_load_field(bt_field *f, bt_snapshot *s);
 
+/// What floes that split have come to (bt_split_totals): in checkpoints, and keys of summary.json.
+extern const bt_state_row bt_split_total_rows[];
+extern const int bt_n_split_total_rows;
+
 /// Structs of the run beside the world, by their tables.
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s);
 void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s);

@@ -21,7 +21,7 @@
 #include "space/shore.h"
 #include "step/splitting.h"
 #include "case/arch.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/case_derived.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
