@@ -151,7 +151,7 @@ static double place_of(const bt_world *w, const bt_gaps *g, int i)
     return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
 }
 
-/// Normal bias b of model equation (1). Of a pair that passes: contact/passing.h.
+/// Normal bias b of model equation (1). Of a pair that passes: contact/contacts.h.
 static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, double restitution)
 {
     const bt_bodies *b = &w->bodies;

@@ -5,7 +5,7 @@
 
 #include "output/sample.h"
 #include "bergtow/comm.h"
-#include "output/roster.h"
+#include "output/gather.h"
 #include "bergtow/world.h"
 
 /// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.

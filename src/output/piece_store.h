@@ -15,7 +15,7 @@
 #include "base/h5util.h"
 #include "output/xdmf.h"
 #include "output/frame.h"
-#include "output/roster.h"
+#include "output/gather.h"
 
 struct bt_splitting;
 

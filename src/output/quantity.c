@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All quantities: the program's own table (series.inc), then what has been registered (quantity.c), those
-// of force laws and contact laws included: their tables may grow, and are looked at before anybody counts.
+// All quantities: the program's own table (series.inc), then what has been registered, those of force laws and contact
+// laws included: their tables may grow, and are looked at before anybody counts.
 #include "bergtow/quantity.h"
 
 #include <ctype.h>

@@ -19,10 +19,9 @@
 #include "step/splitting.h"
 #include "step/window.h"
 #include "partition/domain.h"
-#include "output/state_check.h"
 
-/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it by
-/// itself. What members must be to each other: state_check.c.
+/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it
+/// by itself. What members must be to each other: state_check.c.
 #define MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
     {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_, NULL}
 #define ONE(struct_, label, type_, member, units_, check_, meaning_) \

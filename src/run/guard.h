@@ -41,7 +41,7 @@
 
 #include "bergtow/case.h"
 #include "output/sample.h"
-#include "output/roster.h"
+#include "output/gather.h"
 #include "bergtow/world.h"
 
 typedef struct bt_guard {

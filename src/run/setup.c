@@ -17,7 +17,7 @@
 #include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
-#include "geometry/weld.h"
+#include "geometry/polygons.h"
 #include "space/shore.h"
 #include "step/splitting.h"
 #include "case/arch.h"
@@ -313,7 +313,7 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double conc
     bt_world_free(w);
 }
 
-/// Along which axes undisturbed ice rests, as step/undisturbed.h says.
+/// Along which axes undisturbed ice rests, as step/window.h says.
 static void held_ice(const bt_case *c, double concentration, bool held[2])
 {
     const bool dense = concentration >= BT_BOUND_CONCENTRATION - BT_MADE_OFF,

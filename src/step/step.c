@@ -5,7 +5,6 @@
 
 #include "contact/law_pair.h"
 #include "contact/contacts.h"
-#include "contact/passing.h"
 #include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
@@ -209,7 +208,7 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
 }
 
 /// Detect and solve. The step is solved again, from the impulses found so far, for two reasons. Pairs that bear load
-/// are found to pass each other, or pairs that were let pass to meet (contact/passing.h): the last rounds only give
+/// are found to pass each other, or pairs that were let pass to meet (contact/contacts.h): the last rounds only give
 /// rows back. And the margin of the detection holds for the velocities before the solve; contacts can make a floe
 /// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
 /// margin has grown are detected again.
