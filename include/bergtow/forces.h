@@ -105,7 +105,7 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
     l->jy += g * v;
 }
 
-/// A body as a law sees it: one of the world, or undisturbed ice (step/undisturbed.h), a mean floe that stands nowhere:
+/// A body as a law sees it: one of the world, or undisturbed ice (step/window.h), a mean floe that stands nowhere:
 /// its place is NaN, so that a law which depends on the place and forgets it is found at once where a moving window
 /// takes such ice in; elsewhere it counts as going with the water, in the speed through the ice.
 typedef struct bt_force_body {
@@ -220,7 +220,7 @@ void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse
 /// All that acts on body i at velocity u.
 void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
 
-/// Drag of one body from the moments of its outline, multiplied out: the products of bt_drag (world.h). draft, sail: m;
+/// Drag of one body from the moments of its outline, multiplied out: the products of bt_drag (body.h). draft, sail: m;
 /// densities: kg/m³; coefficients of form and skin drag: 1 (bt_drag_coefs).
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin);

@@ -11,7 +11,7 @@
 #include "bergtow/shape.h"
 #include "case/arch.h"
 #include "case/case_base.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/case_derived.h"
 #include "app/cmd.h"
 #include "app/cmd_check.h"

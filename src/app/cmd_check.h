@@ -45,7 +45,6 @@ double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
 /// Values that nobody gave and that follow from others, in lines, and as the object `by_default` (SI).
 void bt_check_print_defaults(const bt_case *c);
 struct bt_json;
-void bt_check_write_defaults(struct bt_json *j, const bt_case *c);
 
 /// Print the case's numbers as one JSON object: `case`, `title`, `warnings` ({code, text, values}), `domain`, `ice`
 /// (before the lead is opened), `run`, `by_default`, `cost`; units in the names, null for what does not apply.

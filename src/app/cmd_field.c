@@ -2,9 +2,9 @@
 // bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with
 // ice.outlines; or as fixed floes, with base.
 #include "bergtow/field.h"
-#include "case/case_check.h"
 #include "app/cmd.h"
 #include "base/checksum.h"
+#include "case/case_derived.h"
 #include "case/cost.h"
 
 #include <stdio.h>

@@ -18,7 +18,7 @@
 //
 // It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX
 // driver does, and that one reads the files.
-#include "base/h5driver.h"
+#include "base/h5util.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -7,7 +7,7 @@
 
 #include "base/checksum.h"
 #include "base/fileio.h"
-#include "base/h5driver.h"
+#include "base/h5util.h"
 
 typedef struct { const char *path; bt_errors *err; } whole;
 

@@ -12,7 +12,7 @@
 /// name: any file of the disk as raw numbers, a FIFO for ever. No other file is opened here. Errors: BT_ERR_CASE.
 bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err);
 
-/// Open a file for reading through the driver of h5driver.h: a read that fails leaves its errno in *errnum, so that a
+/// Open a file for reading through the driver of h5util.h: a read that fails leaves its errno in *errnum, so that a
 /// disk that reports errors is not taken for a file that is damaged. −1 where HDF5 cannot open it.
 hid_t bt_h5_open_file(const char *path, int *errnum);
 

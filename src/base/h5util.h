@@ -27,14 +27,14 @@ typedef struct bt_h5 {
     char *path;
     bt_status status;
     struct bt_deflater *deflater; ///< of bt_h5_write_chunk, NULL before its first call
-    int *errnum;    ///< first error of the file system, see h5driver.h
+    int *errnum;    ///< first error of the file system, see h5util.h
     bt_errors *err; ///< where the next error goes; the caller of each public function sets it
 } bt_h5;
 
 /// Create (truncate) a file that other programs may read while it is being written.
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
-/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5dataset.h. Returns the same on
-/// all ranks.
+/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5dataset.h. Returns the same
+/// on all ranks.
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err);
 /// Several ranks write into the file.
 static inline bool bt_h5_shared(const bt_h5 *h) { return h->raw >= 0; }
@@ -88,5 +88,13 @@ void bt_h5_write_chunk(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
 uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t row);
 /// Bytes to a place in a shared file, from any rank.
 void bt_h5_write_raw(bt_h5 *h, uint64_t address, size_t bytes, const void *data);
+
+// --- the file driver -------------------------------------------------------------------------------------------------
+
+// An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
+
+/// Select the driver on a file access list. *errnum is set to the errno value of the first failed operation on the file
+/// and must live until the file is closed. Returns a negative value on failure.
+herr_t bt_h5driver_select(hid_t access, int *errnum);
 
 #endif

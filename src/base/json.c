@@ -175,7 +175,7 @@ static const char *last_part(const char *key)
     return dot ? dot + 1 : key;
 }
 
-static void write_value(bt_json *j, const bt_json_key *k, const struct bt_summary_view *v, const void *source)
+static void write_value(bt_json *j, const bt_json_key *k, const struct bt_json_view *v, const void *source)
 {
     const char *key = last_part(k->key), *at = source ? (const char *)source + k->offset : NULL;
     switch (k->kind) {
@@ -189,11 +189,13 @@ static void write_value(bt_json *j, const bt_json_key *k, const struct bt_summar
     case BT_JSON_WRITTEN:
     case BT_JSON_ADDED: k->write(j, key, v, source); break;
     case BT_JSON_LAWS:
+    case BT_JSON_SPLITS:
+    case BT_JSON_SAVED:
     case BT_JSON_GROUP: break;
     }
 }
 
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v,
+void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_json_view *v,
                         const void *const *source)
 {
     enum { DEEPEST = 4 };

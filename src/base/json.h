@@ -33,7 +33,7 @@ void bt_json_free(bt_json *j);
 // The same rows write the file, fill `bergtow --list-quantities` and give the datasets of ensemble.h5 their attributes.
 // A key "a.b" is the member b of the object a, whose own row (BT_JSON_GROUP) comes before.
 
-struct bt_summary_view;
+struct bt_json_view; // what rows are formed from: its type is that of the program that has the table
 
 typedef enum {
     /// at `offset` in its source, or by `number` or `text`
@@ -41,7 +41,9 @@ typedef enum {
     BT_JSON_GROUP,   ///< an object whose members follow; null where it does not apply
     BT_JSON_WRITTEN, ///< what `write` writes, key included
     BT_JSON_ADDED,   ///< the place of the registered quantities (summary_keys.c)
-    BT_JSON_LAWS     ///< and of the totals of contact laws, in a table that is yet to be put together
+    BT_JSON_LAWS,    ///< and of the totals of contact laws, in a table that is yet to be put together
+    BT_JSON_SPLITS,  ///< of those of floes that split
+    BT_JSON_SAVED    ///< and of a running total
 } bt_json_kind;
 
 typedef struct bt_json_key {
@@ -49,10 +51,10 @@ typedef struct bt_json_key {
     bt_json_kind kind;
     int from;                ///< index of its source
     size_t offset;
-    double (*number)(const struct bt_summary_view *v);
-    const char *(*text)(const struct bt_summary_view *v);
-    bool (*when)(const struct bt_summary_view *v); ///< NULL = always; else a group is null, a plain key left out
-    void (*write)(bt_json *j, const char *key, const struct bt_summary_view *v, const void *source);
+    double (*number)(const struct bt_json_view *v);
+    const char *(*text)(const struct bt_json_view *v);
+    bool (*when)(const struct bt_json_view *v); ///< NULL = always; else a group is null, a plain key left out
+    void (*write)(bt_json *j, const char *key, const struct bt_json_view *v, const void *source);
     bool machine;            ///< of the machine and the moment, not of the result: no number of an ensemble's member
 } bt_json_key;
 
@@ -66,7 +68,7 @@ typedef struct bt_json_key {
     .offset = offsetof(type, member)
 
 /// The rows as members of the object that is open. source: by bt_json_key.from.
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v,
+void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_json_view *v,
                         const void *const *source);
 
 /// The row of a key, NULL where there is none.

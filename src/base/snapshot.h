@@ -71,6 +71,7 @@ typedef struct bt_state_row {
     size_t offset;
     const char *units, *meaning, *axes; ///< for a reader of the file; axes as in h5dataset.h
     bt_row_check check;                 ///< held when it is taken
+    const char *key;                    ///< of summary.json, which has the number, too; NULL: it has not
 } bt_state_row;
 
 size_t bt_item_size(bt_item_type type); ///< bytes of one number

@@ -2,7 +2,7 @@
 // Storage of the bodies: growth, outlines and parts of a new one.
 #include "body/bodies.h"
 #include "base/elementary.h"
-#include "geometry/apart.h"
+#include "geometry/polygons.h"
 
 #include <assert.h>
 #include <math.h>

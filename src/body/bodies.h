@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The arrays of bodies (bergtow/world.h): storage, outlines, kinematics. Knows nothing of cells, contacts or ranks.
+// The arrays of bodies (bergtow/body.h): storage, outlines, kinematics. Knows nothing of cells, contacts or ranks.
 #ifndef BERGTOW_BODIES_H
 #define BERGTOW_BODIES_H
 
@@ -74,6 +74,18 @@ static inline bool bt_bodies_slide(const bt_bodies *a, bt_idx i, const bt_bodies
 {
     const double h = a->thickness[i], g = b->thickness[j];
     return bt_bodies_sheet(a, i, towed) && bt_bodies_sheet(b, j, towed) && deck * bt_max(h, g) <= bt_min(h, g);
+}
+
+/// Coefficients of the pair (i, j), gid[i] < gid[j]: those of j (bergtow/body.h).
+static inline double bt_pair_friction(const bt_bodies *b, bt_idx i, bt_idx j)
+{
+    (void)i;
+    return b->friction[j];
+}
+static inline double bt_pair_restitution(const bt_bodies *b, bt_idx i, bt_idx j)
+{
+    (void)i;
+    return b->restitution[j];
 }
 
 /// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.

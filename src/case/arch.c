@@ -7,7 +7,7 @@
 
 #include "bergtow/shape.h"
 #include "base/elementary.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 
 /// Body widths that ice from this concentration on needs.
 static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.7, 30}, {0.85, BT_ARCH_LOCKING}};

@@ -4,11 +4,13 @@
 // A check names the keys it looks at; when one of them was refused already, it is left out: its message would be about
 // the default that stands in for the refused value.
 #include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/warning.h"
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
 #include "case/case_idle.h"
+#include "case/cost.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
 #include "base/largest.h"

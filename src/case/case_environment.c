@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What surrounds the body: tables of current and wind that a case names, the lead ahead, and checks of their keys.
 #include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/warning.h"
 
 #include <math.h>

@@ -9,7 +9,7 @@
 // meanwhile, it would be the case of another run under the name of this one.
 //
 // Rejected: a checkpoint at time zero, which holds them. A checkpoint means that a new result stands and the old one
-// may go (output/folder.h), and that a member of an ensemble whose process dies gets on (run/ensemble_member.h).
+// may go (output/folder.h), and that a member of an ensemble whose process dies gets on (run/ensemble_list.h).
 #ifndef BT_CASE_FILES_H
 #define BT_CASE_FILES_H
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Numbers that follow from other keys where they are not given.
 #include "case/case_check.h"
+#include "case/case_tow.h"
 
 #include "bergtow/shape.h"
 #include "base/largest.h"

@@ -10,7 +10,6 @@
 #include "case/schema.h"
 #include "base/table.h"
 #include "base/tree.h"
-#include "case/value.h"
 
 #include <ctype.h>
 #include <math.h>

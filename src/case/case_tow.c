@@ -10,6 +10,7 @@
 #include "case/warning.h"
 #include "case/rope.h"
 #include "bergtow/shape.h"
+#include "case/case_tow.h"
 #include "case/case_check.h"
 #include "case/speed_law.h"
 #include "base/elementary.h"

@@ -3,7 +3,7 @@
 #include "base/json.h"
 #include "base/largest.h"
 #include "case/case_base.h"
-#include "case/value.h"
+#include "case/schema.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -4,6 +4,7 @@
 #define BERGTOW_COST_H
 
 #include "bergtow/case.h"
+#include "case/case_faults.h"
 #include "bergtow/comm.h"
 #include "bergtow/field.h"
 
@@ -77,5 +78,8 @@ double bt_cost_machine(void);
 /// Refuse a case of n_floes that needs more memory than a machine has, or more disk than any run may take. Errors:
 /// BT_ERR_CASE.
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err);
+
+/// Work and output of the run against the limits of size, of a case that is sound so far.
+void bt_case_check_cost(const bt_check *k);
 
 #endif

@@ -15,7 +15,6 @@
 #include "case/case_check.h"
 #include "case/case_idle.h"
 #include "case/schema.h"
-#include "case/value.h"
 
 static const struct {
     const char *key;

@@ -14,7 +14,6 @@
 #include "base/elementary.h"
 #include "base/largest.h"
 #include "case/schema.h"
-#include "case/value.h"
 
 static const double LEAST = 0.99; // a field that was made for the least concentration meets it but nearly
 

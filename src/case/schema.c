@@ -18,7 +18,6 @@
 #include "base/largest.h"
 #include "base/name.h"
 #include "case/case_derived.h"
-#include "case/value.h"
 
 #include <math.h>
 #include <stdio.h>

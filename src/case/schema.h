@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The keys of a case file: one table that drives reading, --set, --list-keys, the resolved file and its documentation.
-#ifndef BERGTOW_SCHEMA_H
-#define BERGTOW_SCHEMA_H
+#ifndef BT_SCHEMA_H
+#define BT_SCHEMA_H
+
+#include <stdio.h>
 
 #include "bergtow/case.h"
 #include "base/units.h"
@@ -72,5 +74,28 @@ void bt_schema_preset(const bt_key *keys, int n, void *base);
 
 /// Release the texts and lists the keys own.
 void bt_schema_release(const bt_key *keys, int n, void *base);
+
+// --- values ----------------------------------------------------------------------------------------------------------
+
+// Values of keys: text to member, and member to text.
+
+/// Bounds of a key in SI; those without a range get ±infinity.
+typedef struct bt_range {
+    double lo, hi;
+    bool lo_open, hi_open;
+} bt_range;
+
+/// The range of a key from its text. False when the text is malformed.
+bool bt_value_range(const bt_key *k, bt_range *r);
+
+/// Read a scalar into the member of the key under base. plain: not quoted, so that none means "no value". On refusal
+/// the member keeps its value and why says reason and remedy. Not for points.
+bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, char why[BT_WHY]);
+
+/// Read the coordinate of a point, with the key's unit and range.
+bool bt_value_read_coordinate(const bt_key *k, const char *text, double *value, char why[BT_WHY]);
+
+/// Write the member as a YAML scalar (or flow list of points) that reads back to the same bits.
+void bt_value_write(const bt_key *k, const void *base, FILE *out);
 
 #endif

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 
 #include "base/elementary.h"
+#include "case/case_derived.h"
 #include "bergtow/shape.h"
-#include "case/case_check.h"
 
 #define MOST_POINTS 20000.0 // of a track whose wake is sought: each is compared with all before
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Values of keys: strict reading of scalars with unit and range, and writing that keeps every bit.
-#include "case/value.h"
+#include "case/schema.h"
 
 #include "base/largest.h"
 #include "base/name.h"

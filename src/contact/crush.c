@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "contact/overlap.h"
+#include "body/bodies.h"
 #include "contact/row.h"
 #include "contact/law_pair.h"
 
@@ -258,7 +259,7 @@ static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, con
     approach_of(w, u, &mass, hits);
     for (int i = 0; i < m->n_points; i++) {
         place[i] = bt_max(g->gap[i], 0) / dt;
-        strikes[i] = !rafts && !(s->restitution[m->b] > 0) && c.point[i] &&
+        strikes[i] = !rafts && !(bt_pair_restitution(s, m->a, m->b) > 0) && c.point[i] &&
                      hits[i].before > bt_max(place[i], w->par.rest_speed);
     }
     double area[2];

@@ -9,6 +9,7 @@
 #include "base/inside.h"
 #include "contact/contacts.h"
 #include "contact/law.h"
+#include "contact/law_pair.h"
 #include "contact/pack.h"
 #include "partition/domain.h"
 #include "space/cells.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The table of contact laws, and what is the same for all of them; contact/law.h.
 #include "contact/law.h"
+#include "contact/law_pair.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -162,9 +162,6 @@ bool bt_law_on(const bt_params *p, int law);
 /// And those of this pair?
 bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
 
-/// Is the pair of a record still near: at most BT_LAW_MEMORY mean floe sizes apart?
-bool bt_law_near(const bt_world *w, const bt_memory *r);
-
 /// At the start of a detection: forget what cell t need not remember any more.
 void bt_laws_prune(const bt_world *w, bt_cell *t);
 
@@ -176,49 +173,6 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
 
 /// Collective. After the solve: what gives way, into the records; work, numbers and depths into stats.
 void bt_laws_grow(bt_world *w);
-
-/// Record of the pair of names.a, b, part, law in cell t, −1 = none.
-bt_idx bt_law_find(const bt_cell *t, const bt_memory *names);
-
-/// Write record r: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
-void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r);
-
-/// Points of a contact that take part in this step: those that close by the velocities before the contacts, and those
-/// that are no more than a slop farther than the nearest one, whatever closes them.
-typedef struct bt_closing {
-    bool point[2];
-    int n;           ///< how many: one at least
-    double gap;      ///< the least of all points between the surfaces that are left, at least 0, m
-    double approach; ///< the fastest of those that take part, at least 0, m/s
-} bt_closing;
-
-/// Those of contact j of cell t, made from manifold m, by its gaps as they are now. Any other point is there or not as
-/// the margin of the search has it, and with it the speeds of bodies nearby: what a contact bears must not depend on
-/// it.
-bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m);
-
-/// Place of point i along the tangent, from the centroid of a, m.
-static inline double bt_law_along(const bt_manifold *m, int i) { return m->nx * m->p[i].ra[1] - m->ny * m->p[i].ra[0]; }
-
-/// Part of the tangent line that a contact bears on.
-typedef struct bt_patch {
-    double length, middle; ///< m, m from the centroid of a along the tangent; NaN where they do not overlap
-} bt_patch;
-
-/// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent; *area: of the
-/// overlap, m².
-bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way, double *area);
-
-/// Share of a patch that falls to point i of the manifold, of those that take part: uniform pressure on it, as forces
-/// at the points. NaN: to each alike.
-double bt_law_share(const bt_manifold *m, int i, bt_patch p, const bt_closing *c);
-
-/// Names of the record that a law has, or would have, of pair p.
-static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int law)
-{
-    const bt_gid *gid = w->bodies.gid;
-    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .law = (uint16_t)law};
-}
 
 /// A flat bound c of this law on point i, whatever bounds it now, N s.
 static inline void bt_law_narrow(bt_limit *l, int i, double c, int law)

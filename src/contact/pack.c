@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "contact/law.h"
+#include "body/bodies.h"
 #include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
@@ -119,7 +120,7 @@ void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u)
 {
     const bt_bodies *b = &w->bodies;
     const double nx = m->nx, ny = m->ny;
-    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points,
+    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = bt_pair_friction(b, m->a, m->b), .n = m->n_points,
                       .pair = u->pair};
     for (int i = 0; i < m->n_points; i++) {
         const bt_point *q = &m->p[i];
@@ -150,7 +151,7 @@ static double place_of(const bt_world *w, const bt_gaps *g, int i)
     return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
 }
 
-/// Normal bias b of model equation (1). Of a pair that passes: contact/passing.h.
+/// Normal bias b of model equation (1). Of a pair that passes: contact/contacts.h.
 static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, double restitution)
 {
     const bt_bodies *b = &w->bodies;
@@ -170,7 +171,7 @@ static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, 
 
 void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share)
 {
-    const double restitution = share * w->bodies.restitution[u->b];
+    const double restitution = share * bt_pair_restitution(&w->bodies, u->a, u->b);
     for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g, i, restitution);
 }
 

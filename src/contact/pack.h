@@ -6,7 +6,7 @@
 #include "contact/contacts.h"
 #include "space/cells.h"
 
-/// What the way of a pair has to say about its row (contact/passing.h).
+/// What the way of a pair has to say about its row (contact/contacts.h).
 typedef enum {
     BT_ROW_STAYS,    ///< in touch, or loaded in the step before, or released and back
     BT_ROW_OPEN,     ///< apart by more than the slop, without load in the step before: it can be released

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Rows of pairs that pass each other are released, and come back where the pair meets; passing.h.
-#include "contact/passing.h"
+// Rows of pairs that pass each other are released, and come back where the pair meets; contacts.h.
+#include "contact/contacts.h"
 
 #include "contact/pack.h"
 #include "contact/row.h"
-#include "geometry/apart.h"
+#include "geometry/polygons.h"
 #include "partition/domain.h"
 #include "space/phases.h"
 #include "space/shore.h"

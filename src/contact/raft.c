@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "contact/overlap.h"
+#include "body/bodies.h"
 #include "contact/row.h"
 #include "contact/law_pair.h"
 #include "base/elementary.h"
@@ -222,7 +223,7 @@ static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, c
     bt_contact *u = &t->contacts[j];
     bt_limit *l = &t->laws.limits[j];
     const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
-    l->flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
+    l->flat[0] = bt_pair_friction(&w->bodies, u->a, u->b) * pressure * r->value[1] * w->par.dt;
     double load = 0;
     if (edge >= 0) {
         const bt_limit *e = &t->laws.limits[edge];

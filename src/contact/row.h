@@ -87,6 +87,16 @@ static inline void bt_impulse_on_b(const bt_contact *u, double *x, double *y)
     *y = normal * u->ny + u->lt * u->nx;
 }
 
+/// The impulse that comes in by a contact whose other body has infinite mass: on the one that can move. False where
+/// both can or neither. inv: of all bodies.
+static inline bool bt_impulse_from_outside(const bt_contact *u, const bt_inv *inv, double *x, double *y)
+{
+    const double sign = (inv[u->b].m > 0) - (inv[u->a].m > 0);
+    bt_impulse_on_b(u, x, y);
+    *x *= sign, *y *= sign;
+    return sign != 0;
+}
+
 static inline double bt_clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
 
 /// Part of the ends of an overlap, e (bt_limit.ends), that is nearest to the load (x, y) of sheets.

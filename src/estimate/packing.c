@@ -6,7 +6,8 @@
 #include <math.h>
 
 #include "bergtow/shape.h"
-#include "case/case_check.h"
+#include "case/case_derived.h"
+#include "case/case_tow.h"
 #include "base/elementary.h"
 
 static const double ALONG = 0.9; // least cosine between the tow and the axis of the domain it is taken to follow

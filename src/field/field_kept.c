@@ -17,7 +17,7 @@
 #include "bergtow/shape.h"
 #include "base/h5dataset.h"
 #include "case/case_files.h"
-#include "case/value.h"
+#include "case/schema.h"
 
 #define MAGIC "bergtow kept field\n"
 

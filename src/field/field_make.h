@@ -6,7 +6,7 @@
 #include "bergtow/field.h"
 #include "bergtow/shape.h"
 #include "case/size_law.h"
-#include "geometry/apart.h"
+#include "geometry/polygons.h"
 
 /// A body that lies in the ice: convex, in domain coordinates.
 typedef struct bt_obstacle {

@@ -9,7 +9,7 @@
 
 #include "bergtow/shape.h"
 #include "field/field_make.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "geometry/path.h"
 #include "base/elementary.h"
 #include "base/largest.h"

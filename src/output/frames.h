@@ -4,7 +4,7 @@
 #define BT_FRAMES_H
 
 #include "output/xdmf.h"
-#include "output/record.h"
+#include "output/frame.h"
 #include "base/h5dataset.h"
 
 typedef struct bt_frames {

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #define COLUMN(column, name, member, units, meaning) \
-    [column] = {name, BT_ITEM_F64, 1, offsetof(bt_sample, member), units, meaning, "time", BT_ROW_ANY}
+    [column] = {name, BT_ITEM_F64, 1, offsetof(bt_sample, member), units, meaning, "time", BT_ROW_ANY, NULL}
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 
 /// Places are those in bt_sample.
@@ -55,32 +55,43 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-#define TOTAL(type, member, rule_, from, units, meaning)                                                               \
+#define TOTAL(type, member, rule_, from, key, units, meaning)                                                          \
     {                                                                                                                  \
-        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member), units, meaning, "one", BT_ROW_ANY},           \
+        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member), units, meaning, "one", BT_ROW_ANY, key},      \
         .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)                                                  \
     }
 static const bt_total totals[] = {
-    TOTAL(F64, sum_contacts, SUM, contacts, "1", "contact points, sum over the steps"),
-    TOTAL(F64, sum_sweeps, SUM, sweeps, "1", "sweeps, sum over the steps"),
-    TOTAL(F64, sum_updates, SUM, contact_updates, "1", "updates of contacts, sum over the steps"),
-    TOTAL(F64, sum_moves, SUM, momentum_moves, "1", "momentum moves, sum over the steps"),
-    TOTAL(F64, sum_checks, SUM, residual_checks, "1", "residuals of contacts that were taken, sum over the steps"),
-    TOTAL(F64, sum_projected, SUM, position_updates, "1",
+    TOTAL(F64, sum_contacts, SUM, contacts, NULL, "1", "contact points, sum over the steps"),
+    TOTAL(F64, sum_sweeps, SUM, sweeps, NULL, "1", "sweeps, sum over the steps"),
+    TOTAL(F64, sum_updates, SUM, contact_updates, NULL, "1", "updates of contacts, sum over the steps"),
+    TOTAL(F64, sum_moves, SUM, momentum_moves, NULL, "1", "momentum moves, sum over the steps"),
+    TOTAL(F64, sum_checks, SUM, residual_checks, NULL, "1",
+        "residuals of contacts that were taken, sum over the steps"),
+    TOTAL(F64, sum_projected, SUM, position_updates, NULL, "1",
         "updates of contacts by the position projection, sum over the steps"),
-    TOTAL(F64, contact_work, SUM, contact_work, "J", "work of the contact impulses so far"),
-    TOTAL(F64, max_overlap, MAX, overlap, "m", "largest overlap so far"),
-    TOTAL(F64, max_momentum_residual, MAX, momentum_residual, "1", "largest residual of the momentum balance so far"),
-    TOTAL(F64, max_residual, MAX, residual, "m/s", "largest residual of the solver so far"),
-    TOTAL(I64, unconverged, STEPS, unconverged, "1", "steps that did not converge"),
-    TOTAL(F64, locked_steps, STEPS, locked, "1", "of them, steps in which some bodies could not give way"),
-    TOTAL(F64, no_load_steps, STEPS, no_load, "1", "of these, steps in which the load of the towed body had no bound"),
-    TOTAL(I64, unprojected, STEPS, unprojected, "1", "steps whose overlap was not removed"),
-    TOTAL(I64, positive_work, STEPS, added_energy, "1", "steps in which contacts added energy"),
-    TOTAL(I64, restitution_cut, STEPS, restitution_cut, "1", "steps in which rebounds were lowered"),
-    TOTAL(I64, repeats, SUM, repeats, "1", "solutions that were repeated"),
-    TOTAL(I64, outrun, STEPS, outrun, "1", "steps whose last solution outran the search for pairs"),
-    TOTAL(I64, misjudged, SUM, misjudged, "1", "loads of pairs that pass, and pairs that meet without one"),
+    TOTAL(F64, contact_work, SUM, contact_work, "contact_work_j", "J", "work of the contact impulses"),
+    TOTAL(F64, max_overlap, MAX, overlap, "max_overlap_m", "m", "deepest overlap of two bodies"),
+    TOTAL(F64, max_momentum_residual, MAX, momentum_residual, "momentum_residual", "1",
+        "largest |momentum change - external impulse| / momentum exchanged of a step"),
+    TOTAL(F64, max_residual, MAX, residual, "max_residual_m_s", "m/s",
+        "largest residual of the contact problem at the end of a step"),
+    TOTAL(I64, unconverged, STEPS, unconverged, "unconverged_steps", "1",
+        "steps that met the limit of work before the tolerance"),
+    TOTAL(F64, locked_steps, STEPS, locked, "locked_steps", "1",
+        "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
+    TOTAL(F64, no_load_steps, STEPS, no_load, "no_load_steps", "1",
+        "of these, steps in which they press on the towed body: its load is no number"),
+    TOTAL(I64, unprojected, STEPS, unprojected, "unprojected_steps", "1",
+        "steps whose position projection met its limit of work"),
+    TOTAL(I64, positive_work, STEPS, added_energy, "positive_work_steps", "1",
+        "steps in which the contacts added energy"),
+    TOTAL(I64, restitution_cut, STEPS, restitution_cut, "restitution_cut_steps", "1",
+        "steps whose restitution was lowered so that the contacts add no energy"),
+    TOTAL(I64, repeats, SUM, repeats, "repeated_solves", "1",
+        "times a step was solved again because floes outran the contact margin"),
+    TOTAL(I64, outrun, STEPS, outrun, "outrun_steps", "1", "steps whose last solution still outran the margin"),
+    TOTAL(I64, misjudged, SUM, misjudged, "misjudged_contacts", "1",
+        "contacts that bore load at the end of a step although the pair passed, and pairs that met without one"),
 };
 
 enum { N_TOTALS = sizeof totals / sizeof *totals };
@@ -98,7 +109,7 @@ static const bt_total *total_of_law(int k)
             made[i] = (bt_total){
                 .at = {t->name, t->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
                        offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value), t->units, t->description,
-                       "one", BT_ROW_ANY},
+                       "one", BT_ROW_ANY, t->key},
                 .rule = t->rule,
                 .offset = offsetof(bt_sample, laws) + (size_t)number * sizeof(double)};
         }

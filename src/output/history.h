@@ -5,7 +5,7 @@
 
 #include "base/snapshot.h"
 #include "contact/law.h"
-#include "output/record.h"
+#include "output/sample.h"
 
 /// Columns of what the summary keeps of every step; names and members of the sample: history.c.
 typedef enum bt_column {

@@ -237,7 +237,7 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
 
 static const bt_state_row state_rows[] = {
 #define STATE(label, member, meaning) \
-    {label, BT_ITEM_I64, 1, offsetof(bt_impact_store, member), "1", meaning, "one", BT_ROW_COUNT}
+    {label, BT_ITEM_I64, 1, offsetof(bt_impact_store, member), "1", meaning, "one", BT_ROW_COUNT, NULL}
     STATE("written", written, "collisions in result.h5"),
     STATE("n_merged", n_merged, "steps merged into the sample of panel loads under way"),
     STATE("samples_written", samples_written, "samples of panel loads in result.h5"),

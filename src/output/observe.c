@@ -61,9 +61,8 @@ static void observe_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
             bt_sum_add(&t->sum[ICE_TURN],
                        sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
             touching += (u->ln[0] > 0) + (u->ln[1] > 0);
-        } else if (prescribed) { // impulses that came from the other bodies of infinite mass
-            const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
-            if (sign != 0) bt_sum_add(&t->sum[BUDGET], sign * (jx * dx + jy * dy));
+        } else if (prescribed && bt_impulse_from_outside(u, b->inv, &jx, &jy)) { // from the others of infinite mass
+            bt_sum_add(&t->sum[BUDGET], jx * dx + jy * dy);
         }
     }
     bt_sum_add(&t->sum[TOUCHING], (double)touching);

@@ -3,8 +3,9 @@
 #ifndef BERGTOW_OBSERVE_H
 #define BERGTOW_OBSERVE_H
 
-#include "output/record.h"
-#include "output/roster.h"
+#include "output/sample.h"
+#include "bergtow/comm.h"
+#include "output/gather.h"
 #include "bergtow/world.h"
 
 /// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.

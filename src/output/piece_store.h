@@ -14,8 +14,8 @@
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/xdmf.h"
-#include "output/record.h"
-#include "output/roster.h"
+#include "output/frame.h"
+#include "output/gather.h"
 
 struct bt_splitting;
 

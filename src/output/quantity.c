@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All quantities: the program's own table (record_series.c), then what has been registered (quantity.c), those
-// of force laws and contact laws included: their tables may grow, and are looked at before anybody counts.
+// All quantities: the program's own table (series.inc), then what has been registered, those of force laws and contact
+// laws included: their tables may grow, and are looked at before anybody counts.
 #include "bergtow/quantity.h"
 
 #include <ctype.h>
@@ -13,7 +13,7 @@
 #include "bergtow/forces.h"
 #include "base/name.h"
 #include "contact/law.h"
-#include "output/record.h"
+#include "output/sample.h"
 
 // --- what has been registered ----------------------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@
 #define BT_RECORD_PARTS_H
 
 #include "output/frames.h"
+#include "output/record.h"
 #include "base/checksum.h"
 #include "base/h5read.h"
 #include "base/h5util.h"

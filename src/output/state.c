@@ -19,12 +19,11 @@
 #include "step/splitting.h"
 #include "step/window.h"
 #include "partition/domain.h"
-#include "output/state_check.h"
 
-/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it by
-/// itself. What members must be to each other: state_check.c.
+/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it
+/// by itself. What members must be to each other: state_check.c.
 #define MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
-    {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_}
+    {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_, NULL}
 #define ONE(struct_, label, type_, member, units_, check_, meaning_) \
     MEMBER(struct_, label, type_, 1, member, units_, "one", check_, meaning_)
 #define ADDED_LAWS "contacts/added_laws"
@@ -137,25 +136,33 @@ static const bt_state_row undisturbed_rows[] = {
         "velocity of the undisturbed ice, x, y, turning; the last is unused"),
 };
 
-#define SPLIT_TOTAL(type, member, units, check, meaning) \
-    ONE(bt_split_totals, #member, type, member, units, check, meaning)
-#define SPLIT_MODE(label, mode, meaning) \
-    ONE(bt_split_totals, label, I64, by_mode[mode], "1", COUNT, meaning)
-static const bt_state_row split_total_rows[] = {
-    SPLIT_MODE("near", BT_SPLIT_NEAR, "floes opened at a load"),
-    SPLIT_MODE("far", BT_SPLIT_FAR, "floes bent"),
-    SPLIT_MODE("burst", BT_SPLIT_BURST, "floes that burst"),
-    SPLIT_TOTAL(I64, deferred, "1", COUNT, "floes that waited for the next step, in all steps"),
-    SPLIT_TOTAL(I64, too_small, "1", COUNT, "floes whose pieces would have been too small, in all steps"),
-    SPLIT_TOTAL(I64, too_old, "1", COUNT, "floes of the last generation that would have split, in all steps"),
-    SPLIT_TOTAL(I64, no_id, "1", COUNT, "floes for whose pieces no ids were left, in all steps"),
-    SPLIT_TOTAL(I64, rafted, "1", COUNT, "floes over or under others that would have split, in all steps"),
-    SPLIT_TOTAL(I64, unconverged, "1", COUNT, "steps that did not converge, and so split nothing"),
-    SPLIT_TOTAL(I64, steps, "1", COUNT, "steps with a split"),
-    SPLIT_TOTAL(F64, crack_length, "m", NOT_NEGATIVE, "length of all cracks"),
-    SPLIT_TOTAL(F64, work, "J", NOT_NEGATIVE, "work of fracture"),
-    SPLIT_TOTAL(F64, largest_refused, "1", NOT_NEGATIVE, "largest stress over strength of a floe that could not split"),
+#define SPLIT_TOTAL(label, type, member, key_, units_, check, meaning_) \
+    {label, BT_ITEM_##type, 1, offsetof(bt_split_totals, member), units_, meaning_, "one", BT_ROW_##check, \
+     "splitting." key_}
+const bt_state_row bt_split_total_rows[] = {
+    SPLIT_TOTAL("near", I64, by_mode[BT_SPLIT_NEAR], "near", "1", COUNT, "of them opened at a load"),
+    SPLIT_TOTAL("far", I64, by_mode[BT_SPLIT_FAR], "far", "1", COUNT, "of them bent"),
+    SPLIT_TOTAL("burst", I64, by_mode[BT_SPLIT_BURST], "burst", "1", COUNT,
+        "of them burst by a load along the crack"),
+    SPLIT_TOTAL("steps", I64, steps, "steps", "1", COUNT, "steps with a split"),
+    SPLIT_TOTAL("crack_length", F64, crack_length, "crack_length_m", "m", NOT_NEGATIVE, "length of all cracks"),
+    SPLIT_TOTAL("work", F64, work, "fracture_work_j", "J", NOT_NEGATIVE,
+        "work of fracture, which is not taken from the motion: toughness squared / modulus, times the cracks' areas"),
+    SPLIT_TOTAL("deferred", I64, deferred, "deferred", "1", COUNT,
+        "floes that were left to the next step after the last round, in all steps: their load may be too high"),
+    SPLIT_TOTAL("too_small", I64, too_small, "refused_size", "1", COUNT,
+        "floes, in all steps, whose pieces would have been too small or too slender"),
+    SPLIT_TOTAL("too_old", I64, too_old, "refused_generation", "1", COUNT,
+        "floes, in all steps, of the last generation"),
+    SPLIT_TOTAL("rafted", I64, rafted, "refused_rafted", "1", COUNT,
+        "floes, in all steps, that lay over or under others"),
+    SPLIT_TOTAL("no_id", I64, no_id, "refused_reserve", "1", COUNT, "floes, in all steps, when no ids were left"),
+    SPLIT_TOTAL("unconverged", I64, unconverged, "unconverged_steps", "1", COUNT,
+        "steps that did not converge, and so split nothing"),
+    SPLIT_TOTAL("largest_refused", F64, largest_refused, "largest_refused_ratio", "1", NOT_NEGATIVE,
+        "largest stress over strength of a floe that could not split"),
 };
+const int bt_n_split_total_rows = N_OF(bt_split_total_rows);
 
 #define SPLIT(type, width, member, units, axes, check, meaning) \
     MEMBER(bt_split_record, #member, type, width, member, units, axes, check, meaning)
@@ -423,7 +430,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 
 static void save_splitting(const bt_splitting *p, bt_snapshot *s)
 {
-    bt_snapshot_add_rows(s, "splitting", split_total_rows, N_OF(split_total_rows), &p->total);
+    bt_snapshot_add_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
     save_columns(s, "splits", split_columns, N_OF(split_columns), p->split, sizeof *p->split, p->n);
     bt_snapshot_add(s, "splits/vertices", BT_ITEM_F64, p->n_vertices, 2, p->vertex);
 }
@@ -433,7 +440,7 @@ static void load_splitting(bt_world *w, bt_snapshot *s)
 {
     bt_splitting *p = w->splitting;
     int64_t n = -1, n_vertices = 0, at = 0;
-    bt_snapshot_take_rows(s, "splitting", split_total_rows, N_OF(split_total_rows), &p->total);
+    bt_snapshot_take_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
     bt_split_record *rows = load_columns(s, "splits", split_columns, N_OF(split_columns), sizeof *rows, &n);
     double *vertex = bt_snapshot_copy(s, "splits/vertices", BT_ITEM_F64, 2, &n_vertices);
     if (!s->faulty) bt_state_check_splits(w, rows, n, vertex, n_vertices, s);

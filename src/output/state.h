@@ -3,11 +3,14 @@
 #ifndef BT_STATE_H
 #define BT_STATE_H
 
+#include <math.h>
+
 #include "bergtow/field.h"
-#include "field/lead.h"
-#include "output/stall.h"
 #include "bergtow/world.h"
 #include "base/snapshot.h"
+#include "field/lead.h"
+#include "output/stall.h"
+#include "space/cells.h"
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
 /// BT_ERR_NUMERIC (bodies lost).
@@ -27,10 +30,38 @@ const char *bt_state_not_finite(const bt_world *w, char name[64]);
 bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 void bt_state_load_field(bt_field *f, bt_snapshot *s);
 
+/// What floes that split have come to (bt_split_totals): in checkpoints, and keys of summary.json.
+extern const bt_state_row bt_split_total_rows[];
+extern const int bt_n_split_total_rows;
+
 /// Structs of the run beside the world, by their tables.
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s);
 void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s);
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s);
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s);
+
+// --- its check -------------------------------------------------------------------------------------------------------
+
+// Is what was taken from a checkpoint a state that steps can leave? (private to state.c)
+
+/// Are all n numbers neither NaN nor infinite?
+static inline bool bt_state_finite(const double *x, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++)
+        if (!isfinite(x[k])) return false;
+    return true;
+}
+
+/// Complains into s of the first thing that is wrong with a field, whose arrays have the lengths that the first two
+/// give.
+void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s);
+
+/// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: those were taken too.
+void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s);
+
+struct bt_split_record;
+/// The same for the history of splits [n] with its vertices, for a world as it was in the beginning.
+void bt_state_check_splits(const bt_world *w, const struct bt_split_record *rows, int64_t n, const double *vertex,
+                           int64_t n_vertices, bt_snapshot *s);
 
 #endif

@@ -6,7 +6,7 @@
 // impulses, counters). Its numbers become indices, lengths of arrays and ends of loops. So each that does is held
 // against what steps keep true before it is used, and every other real number must be finite. Nothing here is an
 // estimate: a bound that a sound run could exceed would take its checkpoint away from it.
-#include "output/state_check.h"
+#include "output/state.h"
 
 #include <math.h>
 #include <stdio.h>

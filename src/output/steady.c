@@ -10,7 +10,7 @@
 
 #include "geometry/path.h"
 #include "step/window.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/track.h"
 #include "case/warning.h"
 #include "base/inside.h"

@@ -21,6 +21,7 @@
 
 #include "bergtow/stats.h"
 #include "output/history.h"
+#include "output/totals.h"
 
 /// below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
 #define BT_STEADY_INDEPENDENT 20

@@ -17,6 +17,7 @@
 #include "base/inside.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/case_idle.h"
 #include "case/ice_bounds.h"
 #include "case/warning.h"

@@ -6,7 +6,7 @@
 #include "bergtow/estimate.h"
 #include "bergtow/stats.h"
 #include "case/arch.h"
-#include "output/record.h"
+#include "output/totals.h"
 #include "output/steady.h"
 #include "step/window.h"
 

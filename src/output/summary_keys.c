@@ -2,6 +2,7 @@
 // The table of summary.json. Keys, order and meaning are those that scripts rely on: a row is added, none is renamed.
 #include "output/summary_keys.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,6 +11,7 @@
 
 #include "output/estimate_text.h"
 #include "output/impact_count.h"
+#include "output/state.h"
 #include "case/warning.h"
 #include "contact/raft.h"
 #include "step/splitting.h"
@@ -180,13 +182,12 @@ static void write_reasons(bt_json *j, const char *key, const view *v, const void
 // --- the tables ------------------------------------------------------------------------------------------------------
 
 #define OF_SUMMARY(...) {BT_JSON_AT(FROM_SUMMARY, bt_summary, __VA_ARGS__)}
-#define OF_HISTORY(...) {BT_JSON_AT(FROM_HISTORY, bt_history, __VA_ARGS__)}
+#define SAVED(key_) {.key = key_, .kind = BT_JSON_SAVED} // a running total of history.c
 #define OF_TOTALS(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__)}
 #define OF_CASE(...) {BT_JSON_AT(FROM_CASE, bt_case, __VA_ARGS__)}
 #define OF_WINDOW(...) {BT_JSON_AT(FROM_WINDOW, bt_window, __VA_ARGS__)}
 #define OF_UNDISTURBED(...) {BT_JSON_AT(FROM_UNDISTURBED, bt_undisturbed, __VA_ARGS__)}
 #define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
-#define OF_SPLITTING(...) {BT_JSON_AT(FROM_SPLITTING, bt_split_totals, __VA_ARGS__)}
 #define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
 #define PHASE(name, text) MACHINE("phases_s." #name, phases.name, "s", "wall time of " text),
 #define SHARED(name, text) MACHINE("shared_s." #name, shared.name, "s", "wall time that threads shared of " text),
@@ -359,14 +360,12 @@ static const bt_json_key rows[] = {
         "published and derived estimates for the conditions of the run; null without a towed body"),
     WRITTEN("estimate_labels", write_labels, "of each estimate its label in pictures and tables, and its kind"),
     {.key = "", .kind = BT_JSON_ADDED, .write = write_added},
-    OF_HISTORY("max_overlap_m", max_overlap, "m", "deepest overlap of two bodies"),
+    SAVED("max_overlap_m"),
     NUMBER("max_overlap_relative", overlap_relative, "1", "the same over the mean floe size"),
-    OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the limit of work before the tolerance"),
-    OF_HISTORY("locked_steps", locked_steps, "1",
-        "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
-    OF_HISTORY("no_load_steps", no_load_steps, "1",
-        "of these, steps in which they press on the towed body: its load is no number"),
-    OF_HISTORY("max_residual_m_s", max_residual, "m/s", "largest residual of the contact problem at the end of a step"),
+    SAVED("unconverged_steps"),
+    SAVED("locked_steps"),
+    SAVED("no_load_steps"),
+    SAVED("max_residual_m_s"),
     OF_TOTALS("tolerance_m_s", tolerance, "m/s", "residual at which the sweeps stop"),
     OF_SUMMARY("mean_sweeps", sweeps, "1", "sweeps of the contact solver in a step, mean over all steps"),
     OF_SUMMARY("mean_contact_updates", updates, "1", "updates of single contacts in a step, mean over all steps"),
@@ -376,24 +375,20 @@ static const bt_json_key rows[] = {
         "residuals of single contacts taken in a step, mean over all steps"),
     OF_SUMMARY("mean_position_updates", projected, "1",
         "updates of single contacts by the position projection of a step, mean over all steps"),
-    OF_HISTORY("unprojected_steps", unprojected, "1", "steps whose position projection met its limit of work"),
+    SAVED("unprojected_steps"),
     OF_SUMMARY("contacts_mean", contacts, "1", "contact points, mean over all steps"),
-    OF_HISTORY("contact_work_j", contact_work, "J", "work of the contact impulses"),
+    SAVED("contact_work_j"),
     {.kind = BT_JSON_LAWS}, // the totals of the contact laws: src/contact/crush.c, raft.c
     NUMBER("rafted_share_of_ice", rafted_share, "1",
         "area in which floes lie over each other at the end, over the area of all ice"),
     OF_TOTALS("stalled_s", stall.time, "s", "time in which the body stood still while the tow asked for motion"),
     OF_TOTALS("stalled_windows", stall.windows, "1", "stretches of time in which it did"),
-    OF_HISTORY("positive_work_steps", positive_work, "1", "steps in which the contacts added energy"),
-    OF_HISTORY("repeated_solves", repeats, "1",
-        "times a step was solved again because floes outran the contact margin"),
-    OF_HISTORY("outrun_steps", outrun, "1", "steps whose last solution still outran the margin"),
-    OF_HISTORY("misjudged_contacts", misjudged, "1",
-        "contacts that bore load at the end of a step although the pair passed, and pairs that met without one"),
-    OF_HISTORY("restitution_cut_steps", restitution_cut, "1",
-        "steps whose restitution was lowered so that the contacts add no energy"),
-    OF_HISTORY("momentum_residual", max_momentum_residual, "1",
-        "largest |momentum change - external impulse| / momentum exchanged of a step"),
+    SAVED("positive_work_steps"),
+    SAVED("repeated_solves"),
+    SAVED("outrun_steps"),
+    SAVED("misjudged_contacts"),
+    SAVED("restitution_cut_steps"),
+    SAVED("momentum_residual"),
     OF_TOTALS("floes_outside", floes_outside, "1", "floes that left an open domain"),
     GROUP("moving_window", has_window, "what the moving window did"),
     OF_WINDOW("moving_window.length_m", length, "m", "length of the window"),
@@ -419,23 +414,7 @@ static const bt_json_key rows[] = {
     OF_WINDOW("moving_window.brought_energy_j", brought[2], "J", "kinetic energy of the renewed floes as they entered"),
     GROUP("splitting", has_splitting, "floes that split"),
     COUNT("splitting.splits", n_splits, "1", "splits, each of a floe into two pieces"),
-    OF_SPLITTING("splitting.near", by_mode[BT_SPLIT_NEAR], "1", "of them opened at a load"),
-    OF_SPLITTING("splitting.far", by_mode[BT_SPLIT_FAR], "1", "of them bent"),
-    OF_SPLITTING("splitting.burst", by_mode[BT_SPLIT_BURST], "1", "of them burst by a load along the crack"),
-    OF_SPLITTING("splitting.steps", steps, "1", "steps with a split"),
-    OF_SPLITTING("splitting.crack_length_m", crack_length, "m", "length of all cracks"),
-    OF_SPLITTING("splitting.fracture_work_j", work, "J",
-        "work of fracture, which is not taken from the motion: toughness squared / modulus, times the cracks' areas"),
-    OF_SPLITTING("splitting.deferred", deferred, "1",
-        "floes that were left to the next step after the last round, in all steps: their load may be too high"),
-    OF_SPLITTING("splitting.refused_size", too_small, "1",
-        "floes, in all steps, whose pieces would have been too small or too slender"),
-    OF_SPLITTING("splitting.refused_generation", too_old, "1", "floes, in all steps, of the last generation"),
-    OF_SPLITTING("splitting.refused_rafted", rafted, "1", "floes, in all steps, that lay over or under others"),
-    OF_SPLITTING("splitting.refused_reserve", no_id, "1", "floes, in all steps, when no ids were left"),
-    OF_SPLITTING("splitting.unconverged_steps", unconverged, "1", "steps that did not converge, and so split nothing"),
-    OF_SPLITTING("splitting.largest_refused_ratio", largest_refused, "1",
-        "largest stress over strength of a floe that could not split"),
+    {.kind = BT_JSON_SPLITS}, // its totals: bt_split_total_rows of src/output/state.c
     MACHINE_SUMMARY("ns_per_floe_step", ns_per_floe_step, "ns", "wall time for each floe and step"),
     GROUP("phases_s", NULL, "wall time by phase of the step"),
     BT_WALL_PHASES(PHASE)
@@ -450,27 +429,43 @@ static const bt_json_key rows[] = {
     WRITTEN("warnings", write_warnings, "doubts about the numbers: [{code, text, values}]"),
 };
 
-/// The totals of the contact laws as keys.
-static int keys_of_laws(bt_json_key *key)
+/// Saved members that are keys, too.
+static int keys_of_rows(bt_json_key *key, const bt_state_row *row, int n, int from)
 {
-    int i = 0;
-    for (int law = 0; law < BT_LAWS; law++)
-        for (int j = 0; j < bt_laws[law]->n_totals; j++, i++) {
-            const bt_law_total *t = &bt_laws[law]->totals[j];
-            key[i] = (bt_json_key){.key = t->key, .units = t->units, .description = t->description,
-                                   .kind = t->rule == BT_TOTAL_STEPS ? BT_JSON_INT : BT_JSON_REAL, .from = FROM_HISTORY,
-                                   .offset = offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value)};
-        }
-    return i;
+    for (int i = 0; i < n; i++)
+        key[i] = (bt_json_key){.key = row[i].key, .units = row[i].units, .description = row[i].meaning,
+                               .kind = row[i].type == BT_ITEM_I64 ? BT_JSON_INT : BT_JSON_REAL, .from = from,
+                               .offset = row[i].offset};
+    return n;
+}
+
+/// The running total of a key.
+static const bt_state_row *total_of(const char *key)
+{
+    for (int k = 0; k < bt_n_history_totals(); k++) {
+        const bt_state_row *row = &bt_history_total(k)->at;
+        if (row->key && !strcmp(row->key, key)) return row;
+    }
+    assert(!"a total of this key");
+    return NULL;
 }
 
 const bt_json_key *bt_summary_keys(int *n)
 {
-    static bt_json_key keys[sizeof rows / sizeof *rows + BT_MAX_LAW_TOTALS];
+    enum { MOST_SPLITS = 32 };
+    static bt_json_key keys[sizeof rows / sizeof *rows + BT_MAX_LAW_TOTALS + MOST_SPLITS];
     static int made;
     for (size_t k = 0, ready = made > 0; !ready && k < sizeof rows / sizeof *rows; k++) {
-        if (rows[k].kind == BT_JSON_LAWS) made += keys_of_laws(keys + made);
-        else keys[made++] = rows[k];
+        if (rows[k].kind == BT_JSON_LAWS) {
+            for (int i = bt_n_history_totals() - bt_law_first_total(BT_LAWS); i < bt_n_history_totals(); i++)
+                made += keys_of_rows(keys + made, &bt_history_total(i)->at, 1, FROM_HISTORY);
+        } else if (rows[k].kind == BT_JSON_SAVED) {
+            made += keys_of_rows(keys + made, total_of(rows[k].key), 1, FROM_HISTORY);
+        } else if (rows[k].kind == BT_JSON_SPLITS) {
+            made += keys_of_rows(keys + made, bt_split_total_rows, bt_n_split_total_rows, FROM_SPLITTING);
+        } else {
+            keys[made++] = rows[k];
+        }
     }
     *n = made;
     return keys;

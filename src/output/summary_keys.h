@@ -7,7 +7,7 @@
 #include "output/summary.h"
 
 /// What a summary is made of.
-typedef struct bt_summary_view {
+typedef struct bt_json_view {
     const bt_summary *s;
     const bt_history *h;
     const bt_case *c;

@@ -5,7 +5,7 @@
 
 #include "bergtow/case.h"
 #include "bergtow/field.h"
-#include "output/record.h"
+#include "output/frame.h"
 
 // --- axes ------------------------------------------------------------------------------------------------------------
 

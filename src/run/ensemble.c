@@ -17,7 +17,6 @@
 #include "field/field_kept.h"
 #include "bergtow/run.h"
 #include "run/ensemble_list.h"
-#include "run/ensemble_member.h"
 #include "run/halt.h"
 #include "run/study.h"
 #include "base/fileio.h"

@@ -43,7 +43,6 @@
 #include "bergtow/quantity.h"
 #include "output/summary_keys.h"
 #include "base/units.h"
-#include "case/value.h"
 
 static const char *const series[] = {"time", "ice_resistance", "tow_force"};
 enum { N_SERIES = sizeof series / sizeof *series };

@@ -16,7 +16,6 @@
 #include "case/cost.h"
 #include "field/field_kept.h"
 #include "output/checkpoint.h"
-#include "run/ensemble_member.h"
 #include "run/study.h"
 
 // --- the journal -----------------------------------------------------------------------------------------------------

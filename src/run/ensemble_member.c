@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // State of a member of an ensemble, by its files.
-#include "run/ensemble_member.h"
+#include "run/ensemble_list.h"
 
 #include <errno.h>
 #include <fcntl.h>

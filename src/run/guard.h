@@ -40,8 +40,8 @@
 #define BT_GUARD_H
 
 #include "bergtow/case.h"
-#include "output/record.h"
-#include "output/roster.h"
+#include "output/sample.h"
+#include "output/gather.h"
 #include "bergtow/world.h"
 
 typedef struct bt_guard {

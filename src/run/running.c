@@ -24,7 +24,6 @@
 #include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
-#include "case/case_check.h"
 #include "case/case_files.h"
 #include "case/cost.h"
 #include "field/field_kept.h"
@@ -33,6 +32,7 @@
 #include "base/fileio.h"
 #include "output/folder.h"
 #include "output/gather.h"
+#include "case/case_derived.h"
 #include "run/run_parts.h"
 
 typedef bt_running run;

@@ -17,11 +17,11 @@
 #include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
-#include "geometry/weld.h"
+#include "geometry/polygons.h"
 #include "space/shore.h"
 #include "step/splitting.h"
 #include "case/arch.h"
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "case/case_derived.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
@@ -313,7 +313,7 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double conc
     bt_world_free(w);
 }
 
-/// Along which axes undisturbed ice rests, as step/undisturbed.h says.
+/// Along which axes undisturbed ice rests, as step/window.h says.
 static void held_ice(const bt_case *c, double concentration, bool held[2])
 {
     const bool dense = concentration >= BT_BOUND_CONCENTRATION - BT_MADE_OFF,

@@ -7,7 +7,7 @@
 #include "bergtow/field.h"
 #include "bergtow/world.h"
 #include "case/track.h"
-#include "output/roster.h"
+#include "output/gather.h"
 #include "tow/tow.h"
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:

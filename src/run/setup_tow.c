@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "case/case_check.h"
+#include "case/case_tow.h"
 #include "base/elementary.h"
 
 bt_tow *bt_setup_tow(const bt_case *c)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a study gives to some of its members alone: keys of parameters, of variants, and of `with`.
+// What reading a study is made of, beside bergtow/study.h.
 #ifndef BT_STUDY_H
 #define BT_STUDY_H
 
@@ -9,6 +9,10 @@
 #include "base/checksum.h"
 #include "base/tree.h"
 
+// --- what some members alone get -------------------------------------------------------------------------------------
+
+// What a study gives to some of its members alone: keys of parameters, of variants, and of `with`.
+
 /// A key that some members get. The texts are the study's.
 typedef struct {
     const char *text;    ///< the key, or "key=value"
@@ -17,9 +21,6 @@ typedef struct {
     const char *section; ///< parameters, variants or with
     int axis;            ///< the parameter that decides who gets it
 } bt_study_setting;
-
-/// All of them, those of parameters first; the caller frees the list.
-bt_study_setting *bt_study_settings(const bt_study *s, int *n);
 
 /// The section in which a key is given to some members alone, NULL = none.
 const char *bt_study_varied(const bt_study *s, const char *key);

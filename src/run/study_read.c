@@ -12,7 +12,7 @@
 #include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
-#include "case/value.h"
+#include "case/schema.h"
 
 /// Members write no frames unless the study sets this: what it says comes later, and counts.
 static const char no_frames[] = "output.frame_interval=-1 s";

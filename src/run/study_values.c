@@ -13,7 +13,6 @@
 #include "base/rng.h"
 #include "base/name.h"
 #include "case/schema.h"
-#include "case/value.h"
 #include "run/study.h"
 
 void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...)

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "bergtow/sum.h"
+#include "body/bodies.h"
 #include "contact/law_pair.h"
 #include "contact/pack.h"
 #include "partition/domain.h"
@@ -27,8 +28,9 @@ static void restore(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     (void)context;
     const bt_cell *cell = &w->cells->cell[k];
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        t->most = bt_max(t->most, w->bodies.restitution[cell->contacts[j].b]);
-        bt_pack_bias(w, &cell->contacts[j], &cell->gaps[j], 1);
+        bt_contact *u = &cell->contacts[j];
+        t->most = bt_max(t->most, bt_pair_restitution(&w->bodies, u->a, u->b));
+        bt_pack_bias(w, u, &cell->gaps[j], 1);
     }
 }
 

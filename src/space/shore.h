@@ -13,8 +13,8 @@
 // may also overlap: where their boundaries cross there is no corner that could be touched.
 //
 // All of this is known when the world is made, since nothing of it moves. Each rank holds it, and the bodies of a shore
-// are large: they are on each rank, and what touches a body from the shore is in the cell of that body, where
-// contacts of several pieces at one place become one (contact/detect.c). A tree of boxes finds the polygons near a body.
+// are large: they are on each rank, and what touches a body from the shore is in the cell of that body, where contacts
+// of several pieces at one place become one (contact/detect.c). A tree of boxes finds the polygons near a body.
 //
 // Rejected: one body for each shore. It would take from the pieces their names, thickness and loads, and needs outlines
 // with holes and without a limit to their vertices. And the "ghost vertices" of a chain of segments (Box2D), which know

@@ -5,7 +5,6 @@
 
 #include "contact/law_pair.h"
 #include "contact/contacts.h"
-#include "contact/passing.h"
 #include "contact/row.h"
 #include "contact/law.h"
 #include "force/environment.h"
@@ -158,12 +157,10 @@ static void balance_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
         bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
         bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
         bt_sum_add(&t->sum[UNSOLVED], bt_contacts_unsolved_work(u, w->stats.residual));
-        const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
-        if (sign == 0) continue;
         double jx, jy;
-        bt_impulse_on_b(u, &jx, &jy);
-        bt_sum_add(&t->sum[APPLIED_X], sign * jx);
-        bt_sum_add(&t->sum[APPLIED_Y], sign * jy);
+        if (!bt_impulse_from_outside(u, b->inv, &jx, &jy)) continue;
+        bt_sum_add(&t->sum[APPLIED_X], jx);
+        bt_sum_add(&t->sum[APPLIED_Y], jy);
     }
     bt_sum_add(&t->sum[POINTS], (double)cell->n_points);
     t->most = bt_max(t->most, cell->overlap);
@@ -211,7 +208,7 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
 }
 
 /// Detect and solve. The step is solved again, from the impulses found so far, for two reasons. Pairs that bear load
-/// are found to pass each other, or pairs that were let pass to meet (contact/passing.h): the last rounds only give
+/// are found to pass each other, or pairs that were let pass to meet (contact/contacts.h): the last rounds only give
 /// rows back. And the margin of the detection holds for the velocities before the solve; contacts can make a floe
 /// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
 /// margin has grown are detected again.

@@ -45,14 +45,14 @@
 // λ alone, so only λ is carried between sweeps, accelerated and exchanged between ranks.
 //
 // A branch whose tension (mean of a step) exceeds its breaking load is gone from the next step on.
-#ifndef BERGTOW_TOW_H
-#define BERGTOW_TOW_H
+#ifndef BT_TOW_H
+#define BT_TOW_H
 
 #include <math.h>
 
 #include "bergtow/case.h"
-#include "geometry/path.h"
 #include "bergtow/world.h"
+#include "geometry/path.h"
 
 enum { BT_MAX_BRANCHES = 2 };
 #define BT_VESSEL_WAY 0.5 ///< of the vessel's way, assumed

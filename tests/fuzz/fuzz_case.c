@@ -11,8 +11,8 @@
 #include "run/setup.h"
 #include "space/cells.h"
 #include "bergtow/world.h"
-#include "case/case_check.h"
 #include "partition/domain.h"
+#include "case/case_derived.h"
 #include "fuzz.h"
 
 /// Files that a case names are left alone: what they hold is not part of the input.

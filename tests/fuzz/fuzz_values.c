@@ -10,7 +10,6 @@
 
 #include "fuzz.h"
 #include "case/schema.h"
-#include "case/value.h"
 
 static const char *const bases[] = {
     "run: {dt: 0.1, duration: 1}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.4, size: 1}\nbody: {x: 3, "

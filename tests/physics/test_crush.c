@@ -5,6 +5,7 @@
 #include "bergtow/outline.h"
 #include "contact/crush.h"
 #include "contact/hit.h"
+#include "contact/law_pair.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
 

@@ -4,7 +4,7 @@
 #include "scene.h"
 
 #include "contact/pack.h"
-#include "geometry/apart.h"
+#include "geometry/polygons.h"
 
 enum { INSTANTS = 1500 };
 

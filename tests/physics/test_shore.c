@@ -3,7 +3,7 @@
 // search for polygons against all pairs.
 #include "all_pairs.h"
 
-#include "geometry/apart.h"
+#include "geometry/polygons.h"
 #include "space/shore.h"
 
 static const double SLOP = 1e-4; // m

@@ -4,7 +4,6 @@
 #include "base/name.h"
 #include "bergtow/shape.h"
 #include "case/schema.h"
-#include "case/value.h"
 #include "case_text.h"
 
 #include <math.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Checks across the keys of a case, and the numbers that follow from it.
-#include "case/case_check.h"
+#include "case/case_derived.h"
+#include "case/case_tow.h"
 #include "case_text.h"
 
 #include <math.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The resolved file of a case reads back to the same bits.
 #include "case/schema.h"
-#include "case/value.h"
 #include "case_text.h"
 
 #include <math.h>

@@ -15,7 +15,6 @@
 #include <cmocka.h>
 
 #include "base/fileio.h"
-#include "base/h5driver.h"
 #include "base/h5util.h"
 #include "scene.h"
 

@@ -7,6 +7,7 @@
 
 #include "case/rope.h"
 #include "case/case_check.h"
+#include "case/case_tow.h"
 #include "run/setup.h"
 
 static bt_case made(void)

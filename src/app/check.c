@@ -1,22 +1,76 @@
 // SPDX-License-Identifier: MIT
-// What the check of a case and that of a study share: refusals, warnings and the ice that a run would begin with.
-#include "app/cmd_check.h"
-#include "case/warning.h"
-
+// What `bergtow check` says of a case beside its own numbers: defaults in use, warnings before a run, all of it as
+// JSON.
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "bergtow/comm.h"
-#include "run/setup.h"
 #include "bergtow/world.h"
+#include "app/cmd_check.h"
+#include "base/elementary.h"
+#include "base/json.h"
+#include "base/units.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_idle.h"
-#include "case/ice_bounds.h"
+#include "case/case_tow.h"
 #include "case/cost.h"
+#include "case/ice_bounds.h"
+#include "case/schema.h"
+#include "case/warning.h"
 #include "estimate/packing.h"
 #include "output/summary.h"
-#include "base/elementary.h"
+#include "run/setup.h"
 #include "split/law.h"
+
+// --- defaults --------------------------------------------------------------------------------------------------------
+
+// Values that a case leaves to the program, and that follow from the rest of it: `check` says what they became.
+
+enum { FIRST = 21, MOST = 118 }; // columns of a line
+
+/// Is the value of this row one that follows, that has an effect, and that nobody changed?
+static bool is_followed(const bt_case *c, const bt_key *k, double *value)
+{
+    if (k->type != BT_KEY_REAL || !k->preset || k->preset[0] != '=') return false;
+    if (!strcmp(k->name, "domain.ahead") && c->domain.ends != BT_BOUND_MOVING) return false;
+    memcpy(value, (const char *)c + k->offset, sizeof *value);
+    return isfinite(*value) && !bt_case_is_unused(c, k->name) && !bt_case_changed(c, k->name);
+}
+
+void bt_check_print_defaults(const bt_case *c)
+{
+    int column = 0;
+    for (int i = 0; i < bt_n_case_keys; i++) {
+        const bt_key *k = &bt_case_keys[i];
+        double value;
+        char text[160];
+        if (!is_followed(c, k, &value)) continue;
+        const char *unit = bt_units_symbol(k->unit);
+        if (fabs(value) < 1e-12) value = 0; // rounding
+        const int n = snprintf(text, sizeof text, "%s %.4g%s%s", k->name, value, *unit ? " " : "", unit);
+        const bool wraps = column > 0 && column + 2 + n > MOST;
+        if (column == 0) column = printf("%-*s%s", FIRST, "by default", text);
+        else if (wraps) column = printf(",\n%*s%s", FIRST, "", text) - 2;
+        else column += printf(", %s", text);
+    }
+    if (column > 0) printf("\n");
+}
+
+static void check_write_defaults(bt_json *j, const bt_case *c)
+{
+    bt_json_open(j, "by_default", '{');
+    for (int i = 0; i < bt_n_case_keys; i++) {
+        double value;
+        if (is_followed(c, &bt_case_keys[i], &value)) bt_json_number(j, bt_case_keys[i].name, value);
+    }
+    bt_json_close(j, '}');
+}
+
+// --- ready to run ----------------------------------------------------------------------------------------------------
+
+// What the check of a case and that of a study share: refusals, warnings and the ice that a run would begin with.
 
 static bt_check_ice ice_of_case(const bt_case *c)
 {
@@ -164,4 +218,80 @@ void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, b
     if (n->count < 1) return;
     bt_ice_warn(c, n->size, n->thickness, warnings);
     bt_ice_warn_slow(c, n->size, warnings);
+}
+
+// --- JSON ------------------------------------------------------------------------------------------------------------
+
+// The numbers of `bergtow check` as JSON, for scripts.
+
+static void write_domain(bt_json *j, const bt_case *c, const bt_check_ice *n)
+{
+    const bt_arch a = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
+    bt_json_open(j, "domain", '{');
+    bt_json_number(j, "length_m", c->domain.length);
+    bt_json_number(j, "width_m", c->domain.width);
+    bt_json_string(j, "across", a.key);
+    bt_json_string(j, "sides", a.sides);
+    bt_json_number(j, "body_widths", a.bodies);
+    bt_json_number(j, "body_widths_needed", a.needed);
+    bt_json_bool(j, "load_unbounded", a.unbounded);
+    bt_json_close(j, '}');
+}
+
+static void write_ice(bt_json *j, const bt_case *c, const bt_check_ice *n)
+{
+    const bool splits = n->count >= 1 && c->ice.splitting.toughness > 0;
+    const bt_check_split s = splits ? bt_check_split_of(c, n) : (bt_check_split){NAN, NAN};
+    bt_json_open(j, "ice", '{');
+    bt_json_number(j, "floes", round(n->count));
+    bt_json_number(j, "concentration", n->concentration);
+    bt_json_number(j, "mean_size_m", n->count < 1 ? NAN : n->size);
+    bt_json_number(j, "mean_thickness_m", n->count < 1 ? NAN : n->thickness);
+    bt_json_number(j, "split_three_point_n", s.three_point);
+    bt_json_number(j, "split_opening_n", s.opening);
+    bt_json_close(j, '}');
+}
+
+static void write_run(bt_json *j, const bt_case *c, const bt_check_ice *n)
+{
+    const bt_check_step s = bt_check_step_of(c, n);
+    bt_json_open(j, "run", '{');
+    bt_json_number(j, "duration_s", c->run.duration);
+    bt_json_number(j, "dt_s", c->run.dt);
+    bt_json_int(j, "n_steps", bt_case_steps(c));
+    bt_json_number(j, "tow_distance_m", c->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(c, c->run.duration));
+    bt_json_bool(j, "dt_resolves_collisions", s.contact);
+    bt_json_bool(j, "dt_resolves_floes", n->count < 1 || s.floes);
+    bt_json_close(j, '}');
+}
+
+static void write_cost(bt_json *j, const bt_case *c, const bt_comm *comm, const bt_check_ice *run)
+{
+    const bt_cost_disk d = bt_cost_disk_of(c, run->count, run->corners, comm->size);
+    bt_json_open(j, "cost", '{');
+    bt_json_number(j, "memory_b", bt_cost_memory(c, run->count, run->parts, comm->size, comm->ranks_here));
+    bt_json_number(j, "frames", bt_cost_frames(c));
+    bt_json_number(j, "disk_b", bt_cost_left(&d));
+    bt_json_number(j, "disk_while_running_b", d.most);
+    bt_json_number(j, "core_time_s", bt_check_seconds(c, run));
+    bt_json_number(j, "making_of_ice_s", bt_cost_making(c, run->made));
+    bt_json_close(j, '}');
+}
+
+void bt_check_print_json(const char *path, const bt_case *c, const bt_comm *comm, const bt_check_ice *n,
+                         const bt_check_ice *run, const bt_errors *warnings)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    bt_json_string(&j, "case", path);
+    bt_json_string(&j, "title", c->run.title);
+    bt_warnings_json(&j, "warnings", warnings);
+    write_domain(&j, c, n);
+    write_ice(&j, c, n);
+    write_run(&j, c, run);
+    check_write_defaults(&j, c);
+    write_cost(&j, c, comm, run);
+    bt_json_close(&j, '}');
+    fputs(j.text, stdout);
+    bt_json_free(&j);
 }

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: MIT
-// How far two convex polygons are apart. Independent of the contact code, so that it can check it.
-#ifndef BT_APART_H
-#define BT_APART_H
+// Two convex polygons: how far apart they are, do they meet as they move; outlines that lie flush.
+#ifndef BT_POLYGONS_H
+#define BT_POLYGONS_H
 
 #include <stdbool.h>
+
+#include "bergtow/outline.h"
+
+// --- distance and motion ---------------------------------------------------------------------------------------------
+
+// How far two convex polygons are apart. Independent of the contact code, so that it can check it.
 
 /// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
 typedef struct bt_apart {
@@ -33,5 +39,19 @@ typedef struct bt_moving {
 /// turns about to that of b at the beginning, m. Never false when it does; true, too, for some that pass at little more
 /// than `near` (1 % on a straight way).
 bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy, double near, double dt);
+
+// --- flush outlines --------------------------------------------------------------------------------------------------
+
+// Outlines that lie flush get common vertices.
+
+typedef struct bt_welded {
+    int n;
+    double v[2 * BT_MAX_VERTICES]; ///< m, anticlockwise, in a common frame
+} bt_welded;
+
+/// Move vertices of o[n] that lie within `reach`, m, of the boundary of an outline before theirs onto it: onto its
+/// nearest vertex if one is that near, otherwise onto its edge. Also across periods, m (0 = none). An outline that this
+/// would make unsound, or no longer convex, stays as it is.
+void bt_weld(int n, bt_welded *o, double reach, double period_x, double period_y);
 
 #endif

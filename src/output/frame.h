@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// Bodies and frames as the recorder takes them.
+#ifndef BT_FRAME_H
+#define BT_FRAME_H
+
+#include "bergtow/comm.h"
+#include "bergtow/field.h"
+#include "bergtow/world.h"
+
+/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are distributed in equal blocks in the
+/// order of their ids; the other bodies are the last rank's. first: [size + 1].
+void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
+
+/// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes
+/// first, then (on the last rank) other bodies. Without MPI the block is everything.
+typedef struct bt_record_bodies {
+    bt_idx n_floes, n_bodies;    ///< of all ranks; bodies = floes + hand-made fixed bodies + towed body + walls
+    const int64_t *offsets;      ///< [bodies of the block + 1]
+    const double *vertices;      ///< [offsets[end] − offsets[0]][2] m, body frame, from the block's first
+    const double *thickness;     ///< [bodies of the block] m (draft + sail of the towed body, 0 for walls)
+    const double *area;          ///< [bodies of the block] m²
+    const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
+    bt_idx towed;                ///< index of the towed body among all, −1 = none
+    int branches;                ///< of the tow line, 0 = none
+    /// where this rank holds them all, while the record is open: frames draw their outlines; NULL = those of a copy
+    const bt_bodies *all;
+    const bt_outline_counts *outlines; ///< of the map that the floes came from; NULL: of none
+} bt_record_bodies;
+
+/// A body in a frame.
+typedef struct bt_frame_row {
+    double x, y, yaw;        ///< m, m, rad
+    double contact_force;    ///< largest normal force on the floe in this step, N; of other bodies not recorded
+    double speed;            ///< of the centroid, m/s
+    double vx, vy;           ///< its velocity, m/s; kept in single precision
+    double fx, fy;           ///< sum of all contact forces on the body in this step, N; in single precision, too
+} bt_frame_row;
+enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
+
+/// A piece of a floe in a frame.
+typedef struct bt_piece_row {
+    double piece;            ///< which, from 0
+    bt_frame_row row;
+} bt_piece_row;
+
+/// The tow line in a frame: each branch from the hull to its towing end, or at the hull alone once it is broken.
+enum { BT_FRAME_BRANCHES = 2 };
+typedef struct bt_frame_line {
+    double point[BT_FRAME_BRANCHES][2][2]; ///< m, beside the body as frames show it
+    double tension[BT_FRAME_BRANCHES];     ///< N
+} bt_frame_line;
+
+#endif

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// One step of a run in numbers, and the registry of the series that have them. It drives the series of result.h5, their
+// texts and what the summary keeps of them.
+#ifndef BT_SAMPLE_H
+#define BT_SAMPLE_H
+
+#include <string.h>
+
+#include "bergtow/forces.h"
+#include "bergtow/quantity.h"
+
+/// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
+/// tow direction; resisting components are positive against it, so that
+/// tow = ice + drag + Coriolis + tilt + other laws + inertia.
+typedef struct bt_sample {
+#define ROW(member, ...) double member;
+#define SHOWN(member, ...) double member;
+#define AT(place, member, ...) double member;
+#define UNLESS(place, member, ...) double member;
+#define FORCE(series, ...) double series##_force;
+#include "output/series.inc"
+#undef ROW
+#undef SHOWN
+#undef AT
+#undef UNLESS
+#undef FORCE
+    double laws[BT_MAX_LAW_NUMBERS]; ///< of the contact laws, as in bt_step_stats
+    double added[BT_MAX_ADDED]; ///< [bt_n_added()] of the quantities that were registered
+} bt_sample;
+
+/// The program's own series, one for each member of a sample but `laws` and `added`; those of the contact laws come
+/// before the last BT_SERIES_AFTER_LAWS. With both, and those registered: bt_series.
+extern const bt_quantity bt_own_series[];
+extern const int bt_n_own_series;
+enum { BT_SERIES_AFTER_LAWS = 3 };
+/// How many series there are before the first that is registered.
+int bt_n_program_series(void);
+
+/// Force of series k (bt_force_series_of) on the towed body against the tow direction in the step just solved, N.
+double bt_force_against(const bt_world *w, int k);
+
+/// The same by the name of the series: of_world of a quantity whose context is that name.
+double bt_force_of(const bt_world *w, const void *series);
+
+/// A number of a sample by its quantity.
+static inline double bt_sample_value(const bt_sample *s, const bt_quantity *f)
+{
+    double value;
+    memcpy(&value, (const char *)s + f->offset, sizeof value);
+    return value;
+}
+
+static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double value)
+{
+    memcpy((char *)s + f->offset, &value, sizeof value);
+}
+
+/// Larger than any quantity of a run, and small enough for the squares that the statistics sum up.
+#define BT_SAMPLE_MOST 1e100
+
+/// The first quantity that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the
+/// sample is sound.
+/// has: bit 1 << k for each bt_applies k of the run.
+const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
+
+/// The contact forces of a step in which the load of the towed body has no bound (solve/islands.h) become NaN. The tow
+/// force is one of them at a prescribed speed, and stays a number on a line.
+void bt_sample_lose_load(bt_sample *s, bool prescribed);
+
+#endif
