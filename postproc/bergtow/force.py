@@ -82,7 +82,7 @@ class Bodies:
         self.moment[:] = value
 
     def _add(self, answer: npt.ArrayLike) -> None:
-        """What a force returns."""
+        """Add the value that a force returns."""
         n = len(self.id)
         try:
             given = np.asarray(answer, float)
@@ -112,8 +112,8 @@ Force = Callable[[Bodies], "npt.ArrayLike | None"]
 
 
 class Forces:
-    """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
-    in turn with this one, does nothing in the steps of this."""
+    """The forces of one simulation. Laws are registered for the whole process: a law of another simulation that is
+    stepped in turn with this one does nothing in the steps of this one."""
 
     _callbacks: dict[str, Any] = {}  # name -> the C function; kept for ever, as the library keeps its address
     _owner: dict[str, Forces] = {}      # name -> the Forces that have it now
@@ -171,7 +171,7 @@ class Forces:
             if answer is not None:
                 bodies._add(answer)
             return 0
-        except BaseException as error:  # goes on when the step has returned
+        except BaseException as error:  # raised again when the step has returned
             cls.calling = False
             forces.raised = error
             return 1
