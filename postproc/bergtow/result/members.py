@@ -28,7 +28,7 @@ from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 #: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean, since
-#: what comes shortly before that is the largest of all
+#: its loads shortly before that are the largest of all
 LEAST_TOW = 150.0
 
 #: kinds of doubt about a member, and what each means

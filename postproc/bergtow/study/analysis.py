@@ -3,7 +3,7 @@
 NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
 
 The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
-`found` as it comes back from the file, where what is not finite is None.
+`found` as read from the file, with None for numbers that are not finite.
 """
 import os
 
@@ -49,7 +49,7 @@ def begin(name, file, kind, folder, force):
 
 
 def keep(name, found, folder, force):
-    """Write what was found and say it. Errors: RunError."""
+    """Write a result and print it. Errors: RunError."""
     words, found = KINDS[name][1], writing.plain(found)
     data, *pictures = _files(name, folder)
     writing.write_json(found, data, force)
@@ -64,7 +64,7 @@ def keep(name, found, folder, force):
 
 
 def also(folders):
-    """Folders named by --also hold what they are named for. Errors: RunError."""
+    """Check that the folders named by --also hold results. Errors: RunError."""
     for folder in folders:
         if not any((folder / f"{name}.json").is_file() for name in KINDS):
             raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
@@ -72,8 +72,8 @@ def also(folders):
 
 
 def chapter(name, found):
-    """{"heading", "markdown", "figure"} of what a command found, for a report; figure is a function without arguments,
-    or None. found["doubt"]: why it is not of what the report is of."""
+    """{"heading", "markdown", "figure"} of the result of a command, for a report; figure is a function without
+    arguments, or None. found["doubt"]: why the result does not belong to the subject of the report."""
     heading, words = KINDS[name]
     draw = getattr(words, "figure", None)
     warned = f"WARNING: {found['doubt'][0].upper()}{found['doubt'][1:]}.\n\n" if found.get("doubt") else ""
