@@ -143,7 +143,7 @@ class Case(MutableMapping[str, Any]):
         """The path, valid also after the working folder has changed."""
         return self.path if here() == self._folder else os.path.join(self._folder, self.path or "case")
 
-    def as_it_was(self) -> Case:
+    def frozen_copy(self) -> Case:
         """A copy, if the files that the case builds on (`base`) are unchanged; CaseError otherwise."""
         other = self.copy()
         other._resolve(other.overrides)

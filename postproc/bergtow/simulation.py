@@ -82,7 +82,7 @@ class Simulation:
         self._process = os.getpid()
         self._library = _library.library()
         more["threads"] = _library.threads_here(more["threads"])
-        case = None if case is None else case.as_it_was()
+        case = None if case is None else case.frozen_copy()
         folder = None if out is None else os.fsdecode(out)
         self.folder = os.path.join(here(), folder) if folder else folder  # the working folder may become another one
         self._forces = Forces(forces)
