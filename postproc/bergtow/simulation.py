@@ -37,7 +37,7 @@ def _pointer(array: np.ndarray) -> Any:
 def _id(body: int) -> int:
     """One that the library can take; which bodies there are is its own affair."""
     if not -2**63 <= body < 2**63:
-        raise IndexError(f"body {body}: there is none")
+        raise IndexError(f"body {body}: does not exist")
     return body
 
 
@@ -267,7 +267,7 @@ class Simulation:
     def outline(self, body: int) -> np.ndarray:
         """[n, 2] m, anticlockwise, where the body is."""
         if not 0 <= body < self.n_bodies:
-            raise IndexError(f"body {body}: there is none; ids are 0 to {self.n_bodies - 1}")
+            raise IndexError(f"body {body}: does not exist; ids are 0 to {self.n_bodies - 1}")
         n = self._library.bt_simulation_outline(self._s, body, None, 0)
         out = np.empty((n, 2))
         self._library.bt_simulation_outline(self._s, body, _pointer(out), n)

@@ -169,7 +169,7 @@ def governing(s):
     said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
              f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
     if np.isinf(high):
-        said += ": these fields do not know how far the tail reaches, and it is no value to build on"
+        said += ": these fields do not determine the length of the tail, so do not use the value for a design"
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
 

@@ -25,7 +25,7 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
 def add_options(p, minutes):
     """--budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=above_zero, default=minutes, metavar="MIN",
-                   help=f"wall time, min (default {minutes:g}); the same call goes on")
+                   help=f"wall time, min (default {minutes:g}); the same call continues")
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=_jobs, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")

@@ -336,7 +336,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
-                       "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
+                       "raise --budget; runs are kept, and the same call continues them", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         try:

@@ -237,7 +237,7 @@ class CaseRuns:
         for path, (why, code) in sorted(self.failed.items())[:1]:
             more = f", and {len(self.failed) - 1} more" if len(self.failed) > 1 else ""
             raise RunError(path, f"this run failed{more}: {why}",
-                           "what was found is without it; mend what made it fail", code)
+                           "the result is without it; remove the cause of the failure", code)
 
     def refuse_copies(self, name, fields):
         """Errors: RunError where two of these fields are the same run, whose scatter is none and decides nothing.

@@ -269,7 +269,7 @@ def cut(name, f, hours):
 
 
 def cut_note(some):
-    return [f"Blocks are of one length, what is left over is in no block: {several(some)}."] if some else []
+    return [f"All blocks have one length; the rest is left out: {several(some)}."] if some else []
 
 
 def returns(s, markdown):
