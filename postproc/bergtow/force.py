@@ -89,8 +89,8 @@ class Bodies:
         except (TypeError, ValueError):
             given = None
         if given is not None and n and np.may_share_memory(given, self._load):
-            raise ValueError("a force returned an array of bodies that it has filled in (force, moment or load), which would "
-                             "count twice; fill it in and return nothing, or return a new array")
+            raise ValueError("a force returned an array of bodies that it has filled in (force, moment or load), "
+                             "which would count twice; fill it in and return nothing, or return a new array")
         if given is None or given.shape not in ((n, 2), (n, 3)):
             what = type(answer).__name__ if given is None else f"an array of the shape {given.shape}"
             raise ValueError(f"a force returned {what}; fill in bodies.force [{n}, 2] and "

@@ -204,8 +204,8 @@ def sensitivity(s, markdown):
             f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
             f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, "
             f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They "
-            f"divide the part that it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields "
-            f"and error of the expansion."
+            f"divide the part that it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter "
+            f"of the fields and error of the expansion."
         )
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
