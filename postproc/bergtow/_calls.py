@@ -14,8 +14,8 @@ from ._interrupts import held
 class Calls:
     """Calls of the program, by one thread or by several at a time.
 
-    Rejected: subprocess.run, which a quarter of a second after Ctrl-C kills what it has called, and with it all that
-    was computed since the last checkpoint.
+    Rejected: subprocess.run, which kills its process a quarter of a second after Ctrl-C; all work since the last
+    checkpoint is lost then.
     """
 
     def __init__(self) -> None:
@@ -24,9 +24,9 @@ class Calls:
         self._stopped = False
 
     def run(self, command: list[str], line: Callable[[str], Any] | None = None, **options: Any) -> tuple[int, str]:
-        """Exit code and messages of a call; line: is given each line of its standard output; options: of Popen. An
-        exception that comes meanwhile, as KeyboardInterrupt, asks all calls to stop; it goes on when this one has
-        ended, which is when its checkpoints are written."""
+        """Exit code and messages of a call. line: function that gets each line of its standard output; options: of
+        Popen. An exception that arrives meanwhile, such as KeyboardInterrupt, asks all calls to stop. It is raised
+        again when this call has written its checkpoints and ended."""
         if line:
             options["stdout"] = subprocess.PIPE
         process = None
@@ -39,7 +39,7 @@ class Calls:
                     line(text)
                 process.wait()
             except BaseException:
-                with held():  # however long it takes, and however often it is asked for
+                with held():  # wait as long as it takes, also if the user repeats Ctrl-C
                     self.stop()
                     if process:
                         _wait(process)
@@ -50,8 +50,8 @@ class Calls:
             return process.returncode, errors.read()
 
     def stop(self) -> None:
-        """Ask all calls to stop, once, and begin no others. By SIGTERM, for what a shell has started in the background
-        ignores SIGINT until its run has a handler."""
+        """Ask all calls to stop, once, and begin no others. By SIGTERM, because a process that a shell has started in
+        the background ignores SIGINT until its run has a handler."""
         with self._lock:
             if not self._stopped:
                 self._stopped = True

@@ -87,7 +87,7 @@ class RoutePlan(ctypes.Structure):
 
 
 class Status(c_int):
-    """bt_status of a call: what is not OK is raised, with what the library says of it."""
+    """bt_status of a call: any status but OK is raised, with the library's message."""
 
 
 APPLIED_FORCE = ctypes.CFUNCTYPE(c_int, POINTER(Applied), c_void_p)
@@ -145,7 +145,7 @@ _SIGNATURES = {
 
 def _candidates() -> list[str]:
     """Where the library may be: BERGTOW_LIB alone, if that is set; else the source tree or the prefix that this package
-    lies in, then wherever the linker looks, which may have one with MPI, then what the wheel has brought."""
+    lies in, then the places of the linker, which may have a library with MPI, then the library in the wheel."""
     named = os.environ.get("BERGTOW_LIB")
     if named:
         path = Path(named)
@@ -224,7 +224,7 @@ class Library:
 def load() -> tuple[Library, str]:
     """The library with the types of its functions, and its file. Errors: BergtowError, which says what to do."""
     # Threads that spin at a barrier make a busy machine many times slower (src/app/main.c); libgomp reads this when it
-    # is loaded, and what the user has set wins.
+    # is loaded, and values set by the user win.
     if "OMP_WAIT_POLICY" not in os.environ:
         os.environ.setdefault("GOMP_SPINCOUNT", "20000")
     # UCX, which the Open MPI of Debian 13 loads, takes SIGHUP for its debugger, also from nohup.
@@ -265,7 +265,7 @@ def listed(what: str) -> dict[str, Any]:
 
 
 def limit(name: str) -> Any:
-    """A number by which the program judges windows, domains and maps, or a size of what it takes and gives."""
+    """A number by which the program judges windows, domains and maps, or a size of its inputs and outputs."""
     return listed("limits")[name]
 
 
@@ -282,7 +282,7 @@ def start_mpi() -> None:
 
 
 def whole(text: bytes, what: str, status: int = USAGE) -> bytes:
-    """A text for the library. Errors: BergtowError for one with a NUL, at which it would end in C."""
+    """A text for the library. Errors: BergtowError for a text with a NUL, which would end it in C."""
     if b"\0" in text:
         raise (CaseError if status == CASE else BergtowError)(f"{what} holds the character NUL; take it out", status)
     return text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cases: what a simulation depends on, as the keys of a case file, each checked by the library."""
+"""Cases: the inputs of a simulation, as the keys of a case file, each checked by the library."""
 from __future__ import annotations
 
 import copy
@@ -19,7 +19,7 @@ from .errors import CASE, CaseError
 
 @functools.cache
 def _keys() -> dict[str, dict[str, Any]]:
-    """{key: what the library knows of it}."""
+    """{key: its entry in the library's table of keys}."""
     return {key["name"]: key for key in _library.listed("keys")["keys"]}
 
 
@@ -40,7 +40,7 @@ def setting(key: str, value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A path or a number of numpy as what it stands for."""
+    """A path as text, a number of numpy as a number of Python."""
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if hasattr(value, "tolist"):
@@ -70,7 +70,7 @@ def _as_file(sections: Mapping[str, Any]) -> str:
 
 
 def _content(path: str) -> str | None:
-    """The text of a case file; None where it is to be read by the library, which says what is wrong with it."""
+    """The text of a case file; None if the library is to read it, and to report what is wrong with it."""
     if not os.path.isfile(path):
         return None
     try:
@@ -101,7 +101,7 @@ class Case(MutableMapping[str, Any]):
         case["tow.speed"]                 # 0.7716..., numbers are in SI units, angles in radians, both ways
         case.unit("tow.speed")            # 'm/s'
 
-    Every value is checked when it is set; one that will not do raises CaseError and changes nothing. Where several
+    Every value is checked when it is set; an invalid value raises CaseError and changes nothing. Where several
     values only fit together, set them at once: case.update({...}). None stands for a key that has no value. The numbers
     of a mapping of sections are those of a file: angles in degrees. A file is read once: what becomes of it later does
     not change the case.
@@ -140,11 +140,11 @@ class Case(MutableMapping[str, Any]):
         self._values = values
 
     def place(self) -> str | None:
-        """The path, also from another working folder than that in which the case was made."""
+        """The path, valid also after the working folder has changed."""
         return self.path if here() == self._folder else os.path.join(self._folder, self.path or "case")
 
-    def as_it_was(self) -> Case:
-        """A copy, if the files that the case builds on (`base`) still say what they did; CaseError otherwise."""
+    def frozen_copy(self) -> Case:
+        """A copy, if the files that the case builds on (`base`) are unchanged; CaseError otherwise."""
         other = self.copy()
         other._resolve(other.overrides)
         if other.resolved != self.resolved:

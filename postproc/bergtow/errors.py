@@ -13,8 +13,8 @@ OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 
 class BergtowError(Exception):
-    """What was asked for cannot be had; the text says why, and what to do. status: the exit code of a command that ends
-    with it."""
+    """A request cannot be fulfilled; the text gives the reason and the remedy. status: the exit code of a command that
+    ends with it."""
 
     def __init__(self, text: str, status: int = USAGE) -> None:
         super().__init__(text)
@@ -34,7 +34,7 @@ class RunError(BergtowError):
 
 
 class Refused(RunError):
-    """What the program refuses, in its words, one error a line, and with its exit code."""
+    """An input that the program refuses, with the program's messages, one error a line, and its exit code."""
 
     def __init__(self, path: Union[str, os.PathLike[str]], said: str, status: int) -> None:
         BergtowError.__init__(self, said, status)

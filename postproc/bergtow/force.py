@@ -82,15 +82,15 @@ class Bodies:
         self.moment[:] = value
 
     def _add(self, answer: npt.ArrayLike) -> None:
-        """What a force returns."""
+        """Add the value that a force returns."""
         n = len(self.id)
         try:
             given = np.asarray(answer, float)
         except (TypeError, ValueError):
             given = None
         if given is not None and n and np.may_share_memory(given, self._load):
-            raise ValueError("a force returned what it has filled in (bodies.force, moment or load), which would count "
-                             "twice; fill it in and return nothing, or return an array of its own")
+            raise ValueError("a force returned an array of bodies that it has filled in (force, moment or load), "
+                             "which would count twice; fill it in and return nothing, or return a new array")
         if given is None or given.shape not in ((n, 2), (n, 3)):
             what = type(answer).__name__ if given is None else f"an array of the shape {given.shape}"
             raise ValueError(f"a force returned {what}; fill in bodies.force [{n}, 2] and "
@@ -112,8 +112,8 @@ Force = Callable[[Bodies], "npt.ArrayLike | None"]
 
 
 class Forces:
-    """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
-    in turn with this one, does nothing in the steps of this."""
+    """The forces of one simulation. Laws are registered for the whole process: a law of another simulation that is
+    stepped in turn with this one does nothing in the steps of this one."""
 
     _callbacks: dict[str, Any] = {}  # name -> the C function; kept for ever, as the library keeps its address
     _owner: dict[str, Forces] = {}      # name -> the Forces that have it now
@@ -171,7 +171,7 @@ class Forces:
             if answer is not None:
                 bodies._add(answer)
             return 0
-        except BaseException as error:  # goes on when the step has returned
+        except BaseException as error:  # raised again when the step has returned
             cls.calling = False
             forces.raised = error
             return 1

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The commands as functions: pictures, statistics, reports, outlines, and what is found out by runs.
+"""The commands as functions: pictures, statistics, reports, outlines, and studies that make runs.
 
-They are made within this process, by the very code of the commands, on Figures of matplotlib without pyplot: what a
-program has chosen for its own pictures (backend, fonts) is neither used nor touched. Whoever wants other axes draws
-them from open_result().
+They run in this process, by the code of the commands, and draw on Figures of matplotlib without pyplot: they neither
+use nor change the backend and fonts that a program has chosen for its pictures. For other axes draw from open_result().
 """
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from .result.dataset import Result
     from .study.ensemble import Ensemble
 
-#: a folder by its path, or what stands for it
+#: a folder by its path, or an object that stands for it
 Of = Union[str, "os.PathLike[str]", "Result", "Ensemble"]
 
 
@@ -67,7 +66,7 @@ def _perform(command: str, *words: str | os.PathLike[str]) -> None:
 
 
 def _call(command: str, *words: str | os.PathLike[str]) -> str:
-    """What a command prints. Errors: BergtowError."""
+    """The text that a command prints. Errors: BergtowError."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
         _perform(command, *words)
     return said.getvalue()
@@ -186,7 +185,7 @@ class Outlines:
         self._options = options
 
     def picture(self) -> Picture:
-        """The map beside the floes, with what was left out."""
+        """The map beside the floes, with the parts that were left out."""
         def draw(path: Path) -> None:
             with tempfile.TemporaryDirectory() as there:
                 _call("outlines", self.map, "-o", Path(there) / "x.geojson", "--picture", path, "--force",
@@ -240,7 +239,7 @@ def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[st
 
 
 def converge(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """What of the computation a result depends on, a dictionary as OUT/converge.json has it. options: those of
+    """The numerical choices that a result depends on, as the dictionary of OUT/converge.json. options: those of
     `bergtow converge`, as budget=10, vary="width,dt", set={"tow.speed": 0.5}."""
     return _found("converge", case, out, options)
 
@@ -251,7 +250,7 @@ def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], **options
 
 
 def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """How fast a vessel tows in which ice, and what stops it, a dictionary as OUT/capability.json has it. options:
+    """How fast a vessel tows in which ice, and which ice stops it, as the dictionary of OUT/capability.json. options:
     those of `bergtow capability`; from_ and to for its range."""
     return _found("capability", case, out, options)
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a command is at, said while it works: a line after every few seconds of silence, none of a quick one.
-
-A thread says it, since what takes long is often one call of NumPy or matplotlib that comes back at its end alone.
+"""Progress of a command: a line after every few seconds of silence, none if the command is quick. A thread prints it,
+since long work is often a single call of NumPy or matplotlib.
 """
 import sys
 import threading
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 
 EVERY = 8.0  # s
 
-_at = []  # what the command is at, the innermost last
+_at = []  # current work of the command, the innermost last
 
 
 @contextmanager
@@ -32,7 +31,7 @@ def each(what, items):
 
 @contextmanager
 def told(name):
-    """Say on standard error what doing() names, within the block. name: of the command."""
+    """Print the work named by doing() on standard error, within the block. name: of the command."""
     over, began = threading.Event(), time.monotonic()
     def tell():
         while not over.wait(EVERY):

@@ -37,7 +37,7 @@ def _pointer(array: np.ndarray) -> Any:
 def _id(body: int) -> int:
     """One that the library can take; which bodies there are is its own affair."""
     if not -2**63 <= body < 2**63:
-        raise IndexError(f"body {body}: there is none")
+        raise IndexError(f"body {body}: does not exist")
     return body
 
 
@@ -49,11 +49,11 @@ class Simulation:
             sim.positions, sim.velocities, sim.contacts, sim["ice_resistance"]
 
     out: a result folder as `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
-    functions of Bodies by the name of their series (NAME_force). The block that is left by an exception writes no
-    summary, but for one that was asked to stop (the file `stop` in the folder). case: as it was when the simulation
-    began. Arrays are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the
-    simulation are sorted by cells and allocated anew within a step, so that a view would come to show other bodies, or
-    memory that has been given back; positions of 100,000 bodies take 0.3 ms to copy.
+    functions of Bodies by the name of their series (NAME_force). A block that ends by an exception writes no summary,
+    unless the run was asked to stop (the file `stop` in the folder). case: its state when the simulation began. Arrays
+    are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the simulation are
+    sorted by cells and allocated anew within a step, so that a view would come to show other bodies, or memory that has
+    been given back; positions of 100,000 bodies take 0.3 ms to copy.
     """
 
     def __init__(self, case: Case | str | os.PathLike[str] | Mapping[str, Any],
@@ -65,7 +65,7 @@ class Simulation:
     @classmethod
     def resume(cls, folder: str | os.PathLike[str], *, checkpoint: str | os.PathLike[str] | None = None,
                forces: Mapping[str, Force] | None = None, threads: int = 0, progress: bool = False) -> Simulation:
-        """Go on with a run in its folder, from its last checkpoint or the one that is named.
+        """Continue a run in its folder, from its last checkpoint or the checkpoint that is named.
 
             with Simulation.resume("out/my-run", forces={"my_drag": my_drag}) as sim: ...
 
@@ -82,7 +82,7 @@ class Simulation:
         self._process = os.getpid()
         self._library = _library.library()
         more["threads"] = _library.threads_here(more["threads"])
-        case = None if case is None else case.as_it_was()
+        case = None if case is None else case.frozen_copy()
         folder = None if out is None else os.fsdecode(out)
         self.folder = os.path.join(here(), folder) if folder else folder  # the working folder may become another one
         self._forces = Forces(forces)
@@ -120,8 +120,8 @@ class Simulation:
 
     @property
     def case(self) -> Case:
-        """The case that is simulated; of a run that goes on, as its checkpoint has it. It is made when it is asked for:
-        files that it names, which a run that goes on does not need, must be there by then."""
+        """The case that is simulated; for a resumed run, the case in its checkpoint. It is made on first use. Files
+        that it names must exist then, though a resumed run does not need them."""
         if self._case is None:
             self._case = Case(os.path.join(self.folder or "", "case.resolved.yml"), text=self._resolved)
         return self._case
@@ -181,7 +181,7 @@ class Simulation:
             self.drop()
 
     def checkpoint(self) -> None:
-        """Write a checkpoint into the folder, from which `bergtow resume` goes on."""
+        """Write a checkpoint into the folder, for `bergtow resume`."""
         self._library.bt_simulation_checkpoint(self._s)
 
     def frame(self) -> None:
@@ -267,7 +267,7 @@ class Simulation:
     def outline(self, body: int) -> np.ndarray:
         """[n, 2] m, anticlockwise, where the body is."""
         if not 0 <= body < self.n_bodies:
-            raise IndexError(f"body {body}: there is none; ids are 0 to {self.n_bodies - 1}")
+            raise IndexError(f"body {body}: does not exist; ids are 0 to {self.n_bodies - 1}")
         n = self._library.bt_simulation_outline(self._s, body, None, 0)
         out = np.empty((n, 2))
         self._library.bt_simulation_outline(self._s, body, _pointer(out), n)
@@ -326,7 +326,7 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
         forces: Mapping[str, Force] | None = None, threads: int = 0, replace: bool = False,
         progress: bool | Callable[[Simulation], Any] = False) -> Result:
     """Run a case to its end and return its Result. out: the result folder. Ctrl-C ends it between steps as it ends
-    `bergtow run`: with a summary and a checkpoint, from which Simulation.resume goes on.
+    `bergtow run`: with a summary and a checkpoint, for Simulation.resume.
 
     progress: True for the line of `bergtow run`, which the run renews a few times a second, in notebooks too; or a
     function, called as often with the Simulation.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, and how numbers stand in them."""
+"""Tables of text or Markdown, and the format of numbers in them."""
 import numpy as np
 
 from bergtow.result.at_least import AtLeast
@@ -101,9 +101,9 @@ def bound(value, high):
 
 
 def stated(value, low, high, unit, least=None):
-    """(value, interval) in words with their unit, the ends to what the interval leaves (last_place), "–" for what is
-    not known. A mean has the digits of its interval; a load that is designed for (least: the largest simulated)
-    three."""
+    """(value, interval) in words with their unit, the ends rounded to the place that the interval justifies
+    (last_place), "–" for unknown values. A mean has the digits of its interval; a design load (least: the largest
+    simulated load) has three."""
     if not np.isfinite(value):
         return "–", "–"
     factor, name = scale([value], unit)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Files that are written, and the one rule of what they may replace.
+"""Writing of files, and the one rule for replacing files.
 
-A file that is there is replaced only if bergtow made it, or with --force. Each file carries MARK: a PNG and an MP4 in
+An existing file is replaced only if bergtow made it, or with --force. Each file carries MARK: a PNG and an MP4 in
 their texts, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_by`, Markdown in a comment. Rejected: a
-list of the files in the folder, which knows nothing of a file that was moved there.
+list of the files in the folder, which does not cover a file that was moved there.
 """
 import csv
 import io
@@ -24,7 +24,7 @@ PLACES = {".png": "Software", ".pdf": "Producer", ".svg": "Source"}
 
 
 def made_here(path):
-    """Does a file carry the mark, or nothing at all, as one that a crash or mktemp has left?"""
+    """Does a file carry the mark, or is it empty, as after a crash or mktemp?"""
     with open(path, "rb") as f:
         if not f.seek(0, os.SEEK_END):
             return True
@@ -33,7 +33,7 @@ def made_here(path):
 
 
 def may_write(path, force):
-    """Errors: RunError for a file that is not one of these scripts', and for what is no file at all."""
+    """Errors: RunError for a file that bergtow did not make, and for a path that is not a file."""
     try:
         if not path.exists():
             return
@@ -74,7 +74,7 @@ def write_text(text, path, force):
 
 
 def plain(value):
-    """As it comes back from JSON: numbers of numpy as those of Python, what is not finite as None."""
+    """The value as read back from JSON: numbers of numpy as those of Python, numbers that are not finite as None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

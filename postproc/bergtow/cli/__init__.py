@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The command line: which command is which function, how messages and exit codes come about.
+"""The command line: the modules of the commands, messages and exit codes.
 
-A command is a module with options(p), which says what it takes, and perform(a). What is no command of Python is one of
+A command is a module with options(p), which adds its options to a parser, and perform(a). Any other command belongs to
 the program, which gets the whole line.
 """
 import os
@@ -12,7 +12,7 @@ from importlib import import_module
 from bergtow.cli import command
 from bergtow._program import program_path
 
-#: {command: (module, what it does)}
+#: {command: (module, its help text)}
 COMMANDS = {
     "report": ("reporting.page", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF"),
     "design": ("reporting.design",
@@ -54,7 +54,7 @@ def _joined(words):
 
 
 def tree(name=None):
-    """The parser of all commands; the options of `name` alone, for the modules of the others need not be loaded."""
+    """The parser of all commands; the options of `name` alone, so that the modules of the others need not be loaded."""
     p = command.Parser(prog="bergtow", description="Commands of the Python package bergtow; all others are those of "
                        "the program, see bergtow --help.")
     some = p.add_subparsers(metavar="COMMAND", required=True)

@@ -11,15 +11,15 @@ from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises what argparse prints and ends with."""
+    """Raises BergtowError where argparse would print its message and exit."""
 
     def error(self, message):
         raise BergtowError(f"{message}; see {self.prog} --help", USAGE)
 
 
 class _Stream:
-    """A stream of text that may be lost, as to a reader that leaves (`| head`) or a full disk: what it is given goes
-    nowhere from then on, and the work goes on."""
+    """A stream of text that may be lost, when its reader leaves (`| head`) or the disk is full: text is then discarded,
+    and the work continues."""
 
     def __init__(self, stream):
         self._stream, self.lost = stream, False
@@ -33,7 +33,7 @@ class _Stream:
         except OSError:
             self.lost = True
             nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())  # for what waits in buffers, and for programs that are started
+            os.dup2(nowhere, self._stream.fileno())  # for text in buffers, and for child processes
             os.close(nowhere)
 
     def write(self, text):
@@ -45,8 +45,8 @@ class _Stream:
 
 
 def guarded(name, main):
-    """Run main() and leave the program with the exit code of what happened. What asks it to stop does so as Ctrl-C, for
-    the runs that it has started to end with checkpoints; nohup holds. name: in front of messages."""
+    """Run main() and exit with the code of its outcome. SIGTERM and SIGHUP act as Ctrl-C, so that the runs that main()
+    has started end with checkpoints; nohup keeps its effect. name: in front of messages."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)

@@ -14,7 +14,7 @@ def remedy(module):
 
 
 def message(error):
-    """Of a ModuleNotFoundError, which goes on where the module is one of our own."""
+    """Message for a ModuleNotFoundError. Errors: the same error if the missing module is one of ours."""
     module = (error.name or "").partition(".")[0]
     if module in ("", "bergtow"):
         raise error

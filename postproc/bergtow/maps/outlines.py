@@ -108,20 +108,20 @@ def options(p):
                    "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
     p.add_argument("--heading", metavar="DEG", type=angle, help="direction of x, clockwise from north: metres for the "
                    "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
-    p.add_argument("--crs", help="what the coordinates are where the file does not say it: EPSG:..., any other name "
-                   "that PROJ knows, or local: metres east and north of no place on the earth")
-    p.add_argument("--layer", metavar="NAME", help="which layer, of several; of a NetCDF or HDF5 file which grid")
-    p.add_argument("--where", metavar="SQL", help="only features for which this holds, e.g. \"kind = 'ice'\"")
+    p.add_argument("--crs", help="coordinate reference system, if the file does not name it: EPSG:..., any other "
+                   "name that PROJ knows, or local: metres east and north without a place on the earth")
+    p.add_argument("--layer", metavar="NAME", help="layer to read, if there are several; the grid of a NetCDF or HDF5 file")
+    p.add_argument("--where", metavar="SQL", help="only features that meet this condition, e.g. \"kind = 'ice'\"")
     p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
                    "image the thickness by label: 1=0.5,2=1.2")
-    p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that are no ice "
-                   "(default 0); each connected region of another one is a floe")
-    p.add_argument("--nodata", choices=("water", "unseen"), help="what an image's nodata is (default: unseen; to be "
-                   "named where --water has the same value)")
-    p.add_argument("--unseen", metavar="N,...", type=integers, default=(), help="labels of an image that say that "
-                   "nothing was seen there")
-    p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of what was imaged, as columns "
-                   "and rows of the image from its upper left; all around was not seen")
+    p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that mark water "
+                   "(default 0); each connected region of another label is a floe")
+    p.add_argument("--nodata", choices=("water", "unseen"), help="meaning of an image's nodata (default: unseen; "
+                   "required where --water has the same value)")
+    p.add_argument("--unseen", metavar="N,...", type=integers, default=(), help="labels of an image that mark "
+                   "areas not seen")
+    p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of the imaged area, as columns "
+                   "and rows of the image from its upper left; the area around it was not seen")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "

@@ -15,7 +15,7 @@ def rings(geometries):
 
 
 def draw(found, floes, rules, plane, path, force):
-    """Left the map in the plane, right the floes over it: red is what was left out or cut away."""
+    """Left the map in the plane, right the floes over it, with the parts that were left out or cut away in red."""
     x0, y0, x1, y1 = bounds_of([s.geometry for s in found.shapes])
     scale, unit = style.scale([x1 - x0, y1 - y0], "m")
     ratio = min(1.6, max(0.4, (y1 - y0) / (x1 - x0)))

@@ -14,8 +14,8 @@ where it lay here.
 With a heading H the first axis points along H and the second to the left of it, as in the basin's frame; without one
 they are east and north.
 
-What a file does not say of its coordinates is not guessed: no crs, one that names no place on the earth, or numbers
-that contradict it are refused, with what to say or to do.
+Missing information about coordinates is not guessed: a file without a crs, with a crs that has no place on the earth,
+or with numbers that contradict it is refused, and the message gives the remedy.
 """
 import warnings
 from dataclasses import dataclass
@@ -130,7 +130,7 @@ class Plane:
 
     @staticmethod
     def of(found, crs, centre, heading):
-        """The plane of a map, about the centre or about the middle of what it holds. Errors: RunError."""
+        """The plane of a map, about the centre or about the middle of its shapes. Errors: RunError."""
         xy = np.concatenate([vertices(s.geometry) for s in found.shapes])
         hold_against(found.path, crs, xy, found.implied)
         plane = Plane(crs, centre, heading)
@@ -167,8 +167,8 @@ class Plane:
         return self.lonlat(xy)
 
     def lonlat(self, xy):
-        """Degrees on WGS 84 of coordinates of the map. The 180th meridian has one longitude, so that what a map has cut
-        there has one edge, to the last bit, and is joined again."""
+        """Degrees on WGS 84 of coordinates of the map. The 180th meridian has one longitude only: parts of a floe that
+        a map has cut there share one edge, to the last bit, and are joined again."""
         lon, lat = np.array(self._to.transform(*np.asarray(xy).T))
         return np.c_[np.where(lon <= -180, lon + 360, lon), lat]
 
@@ -197,7 +197,7 @@ class Plane:
         return np.c_[lon, lat]
 
     def distortion(self, xy):
-        """What the plane and the map do to lengths, areas and north at places of the plane, as PROJ computes them:
+        """Distortion of lengths, areas and north by the plane and the map, at places of the plane, computed by PROJ:
         the farthest place, m; the greatest relative errors of a length and of an area; the greatest angle between the
         plane's north and the true one, degrees; least and greatest scale of the map, or None where it has degrees."""
         xy = np.asarray(xy)

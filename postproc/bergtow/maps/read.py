@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Maps of ice as GIS programs have them: outlines in any vector format that GDAL knows, or an image of labels.
+"""Read maps of ice in the formats of GIS programs: outlines in any vector format of GDAL, or an image of labels.
 
-    read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, what was imaged
+    read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, the imaged area
 
 A label image is cut into connected regions of one value; each is a shape. (Regions that meet at a corner only are two.)
 Along pixels an outline would be a staircase, whose corners are no bays: maps/stairs.py makes it straight, that of an
-image and that of outlines which were traced along pixels. Where this leaves nothing (of a crumb) or is not wanted, each
-unit step of an image gives way to its middle: convex and concave corners lose and gain an eighth of a pixel each, and
-since a closed ring has four more of the one than of the other, its area changes by half a pixel in all.
+image and that of outlines which were traced along pixels. Where this would leave nothing of a tiny floe, or is not
+wanted, the outline passes through the middle of each unit step of an image: each convex corner loses an eighth of a
+pixel and each concave corner gains as much. A closed ring has four more convex than concave corners, so its area
+changes by half a pixel in all.
 
 Libraries: osgeo alone, since GDAL reads outlines and images by the same call and both Debians have it. Rejected:
-fiona and rasterio, two packages over the same library for what is used of it here.
+fiona and rasterio, two more packages over the same library.
 """
 import json
 import re
@@ -43,7 +44,7 @@ except ImportError as error:
 
 
 def local_crs():
-    """The name of metres east and north of no place on the earth."""
+    """The name of the crs for metres east and north without a place on the earth."""
     return _library.limit("map_local_crs")
 
 
@@ -56,16 +57,16 @@ class Reading:
     thickness: str = None   #: name of a column; of an image, "VALUE=M,..."
     water: tuple = (0,)     #: values of an image that are no ice
     band: int = None
-    pixel: float = None     #: m, of an image that says nothing of its place
-    nodata: str = None      #: "water" or "unseen": what an image's nodata is where --water has its value, too
-    unseen: tuple = ()      #: values of an image that say that nothing was seen there
-    footprint: tuple = None #: corners of what was imaged, columns and rows of an image
+    pixel: float = None     #: m, of an image without a place on the earth
+    nodata: str = None      #: "water" or "unseen": meaning of an image's nodata if --water names its value, too
+    unseen: tuple = ()      #: values of an image that mark areas that were not seen
+    footprint: tuple = None #: corners of the imaged area, columns and rows of an image
     stairs: str = "undo"    #: or "keep"
 
 
 @dataclass
 class Shape:
-    """One outline, or several of one feature, as the file has them."""
+    """One feature of the file: an outline, or several."""
 
     name: str
     geometry: object            #: Polygon, MultiPolygon or None
@@ -77,15 +78,15 @@ class Shape:
 
 @dataclass
 class Map:
-    """What a file holds."""
+    """The contents of a file."""
 
     path: Path
     crs: str                    #: WKT or a name, local_crs(), or None where the file says nothing
     shapes: list
-    implied: bool = False       #: the crs is the one that the format has where nobody says any
-    seen: object = None         #: what was imaged, in the coordinates of the file; None: not known
+    implied: bool = False       #: the crs is the default of the format
+    seen: object = None         #: the imaged area, in the coordinates of the file; None: not known
     pixels: int = 0             #: in `seen`
-    about: str = ""             #: what the file says of itself
+    about: str = ""             #: description in the file
     near: list = field(default_factory=list)     #: columns not read whose names are nearly that of the thickness
     skipped: dict = field(default_factory=dict)  #: {why: [names]}
     chart: list = field(default_factory=list)    #: columns that an ice chart has, and floes have not
@@ -187,8 +188,8 @@ def retrace(shapes):
 
 
 def thickness_column(layer, columns):
-    """The column of the thickness where none is named, or None. Under another spelling it may hold anything: remarks,
-    texts with units, 0 for what nobody measured."""
+    """The column of the thickness if the caller names none, or None. A column with another spelling may hold anything:
+    remarks, texts with units, 0 for floes that were not measured."""
     def sound(name):
         values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
         return all(positive(value) is not None for value in values)
@@ -278,8 +279,9 @@ def about_of(path, source, layer=None):
 
 
 def mark_cut(found, degrees):
-    """Outlines have no image; where the edges of several lie on one side of the box of all, it was one's edge. But the
-    180th meridian, at which files in degrees part floes (RFC 7946), ends no map."""
+    """Mark outlines that the edge of an image has cut. A vector file has no image: if edges of several outlines lie on
+    one side of the box of all, that side is taken for the edge of an image. The 180th meridian, where files in degrees
+    divide floes (RFC 7946), is not an edge."""
     if found.seen is not None:
         return
     drawn = [s.pixels or s.geometry for s in found.shapes]
@@ -308,7 +310,8 @@ def lies_on(geometry, axis, value, near):
 
 
 def grid_of(path, source, how):
-    """(the data set to read, its name or None): of the grids in a file of NetCDF or HDF5 the one that is named."""
+    """(the data set to read, its name or None). A file of NetCDF or HDF5 may hold several grids: how.layer names
+    one."""
     grids = {re.sub(r'^.*":/*|^[^:]*:[^:]*:/*', "", full): (full, text) for full, text in source.GetSubDatasets()}
     if not grids:
         refuse_unused(path, how, ("layer",), "an image")
@@ -418,8 +421,8 @@ def from_image(path, source, how, name=None):
 
 
 def of_labels(found, labels, valid, water, place, how):
-    """The map of an image. valid: what was seen; water: what is no ice, and need be no label, such as a nodata of NaN.
-    place: GDAL's six numbers from column and row to coordinates, or None."""
+    """The map of an image. valid: pixels that were seen; water: pixels without ice, also those without a label (a
+    nodata of NaN). place: GDAL's six numbers from column and row to coordinates, or None."""
     if how.unseen:
         valid = valid & ~np.isin(labels, how.unseen)
     if how.footprint:

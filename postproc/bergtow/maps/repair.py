@@ -5,22 +5,22 @@ counted.
     book = Ledger()
     floes = repaired(shapes, Rules(tolerance=2.0), book)       shapes of maps/read.py in metres of a plane
 
-In this order: rings that cross themselves, several polygons of one feature, holes; what lies outside the box or in the
+In this order: rings that cross themselves, several polygons of one feature, holes; floes outside the box or in the
 clear circle; staircases and other detail below the tolerance; slivers and small pieces; floes that were cut by the
-image's edge, where they are to go; overlaps, and what the cuts leave.
+image's edge, if they are to be left out; overlaps, and the remains of the cuts.
 
-An overlap is taken from the larger of two floes, which it changes least. Where it is nearly all of both they are the
-same floe traced twice; where it is nearly all of the smaller one, that one lies in the other. Rejected: a middle line
-through the overlap, which changes both, and of three floes depends on the order.
+An overlap is cut from the larger of two floes, which changes it least. If the overlap is nearly all of both, they are
+the same floe traced twice; if it is nearly all of the smaller floe, that floe lies in the other. Rejected: a middle
+line through the overlap, which changes both floes, and for three floes depends on the order.
 
-Floes that touch are drawn apart by a gap of GAP: two that share an edge to the last bit, as neighbours of one label
-image do, have no side to which they part, and the reader takes corners of their convex parts for overlaps.
+Floes that touch are separated by a gap of GAP. Neighbours in a label image share an edge to the last bit; without a gap
+no direction separates them, and the reader takes corners of their convex parts for overlaps.
 
-Of an image the area of a floe is that of its pixels. Simplifying takes the bevelled corners (2.5 % of a square
-of 40 pixels, 15 % of one of 6), so the shore moves out again by as much as keeps the area; where two floes touch, what
-they then share is an overlap as any.
+In an image the area of a floe is that of its pixels. Simplifying removes the bevelled corners (2.5 % of a square of 40
+pixels, 15 % of a square of 6), so the shore is moved out again until the area is right. If two floes then share some
+area, it is treated as any other overlap.
 
-A sliver is what is nowhere as wide as the tolerance: a disc of this diameter fits into it nowhere.
+A sliver is a polygon that is everywhere narrower than the tolerance: a disc of that diameter fits nowhere into it.
 """
 from dataclasses import dataclass, field, replace
 
@@ -44,7 +44,7 @@ GAP = 2e-5               # left between floes, of the mean size
 PASSES, PATIENCE = 40, 8
 NAMED = 20               # of those that are named in the record
 
-#: what is counted, in the order of the report
+#: changes that are counted, in the order of the report
 KINDS = {
     "empty": "features without a geometry, left out",
     "no polygon": "features that are no polygons, left out",
@@ -118,7 +118,7 @@ class Rules:
     clear: float = 0.0          #: radius about the centre
     thin: float = 0.0           #: follows, as the next
     gap: float = 0.0            #: between floes
-    reach: float = 0.0          #: by which a floe is enlarged before it is cut out of another
+    reach: float = 0.0          #: a floe is enlarged by this before it is cut out of another
 
 
 def repaired(shapes, rules, book):
@@ -200,8 +200,8 @@ def chosen(floe, rules, book):
 
 
 def simplified(floe, rules, book):
-    """With fewer vertices: by Douglas & Peucker, no vertex farther from the new outline than the tolerance; more of
-    it where there are too many. What this takes from the corners of a label the shore gets back."""
+    """With fewer vertices: by Douglas & Peucker, no vertex farther from the new outline than the tolerance; with a
+    larger tolerance if vertices are too many. with_area() then restores the area that corners of a label lose."""
     before, tolerance = floe.polygon, rules.detail if floe.straight else rules.tolerance
     polygon = with_area(before.simplify(tolerance) if tolerance else before, floe.pixels)
     if floe.straight:
@@ -219,7 +219,7 @@ def with_area(polygon, area):
     more vertices than a floe may have."""
     new = polygon
     for _ in range(4 if area else 0):
-        if abs(new.area - area) < 1e-6 * area:  # GEOS takes a step of nothing for one that leaves nothing
+        if abs(new.area - area) < 1e-6 * area:  # for a buffer of almost zero GEOS may return an empty polygon
             break
         parts = parts_of(new.buffer((area - new.area) / new.length, join_style=2, mitre_limit=10))
         new = Polygon(max(parts, key=lambda p: p.area).exterior) if parts else polygon
@@ -312,7 +312,7 @@ def apart(floes, rules, book):
                 new[i], new[j] = pair
         if not touched:
             return floes
-        # What was passed over met one that has changed, and meets it again.
+        # A floe that was skipped had met a changed floe, and meets it again in the next pass.
         kept = [([f], False) if k not in new else (new[k], True) for k, f in enumerate(floes)]
         floes = [f for some, _ in kept for f in some]
         changed = np.array([is_new for some, is_new in kept for _ in some], bool)
@@ -321,7 +321,7 @@ def apart(floes, rules, book):
 
 
 def parted(a, b, rules, book):
-    """([Floe] of a, [Floe] of b), or None where they lie apart. What an outline that moves by `thin` shares is none."""
+    """([Floe] of a, [Floe] of b), or None where they lie apart. An overlap no wider than `thin` does not count."""
     small, large = sorted((a, b), key=lambda f: f.polygon.area)
     shared = small.polygon.intersection(large.polygon).area
     overlap = shared > rules.thin * small.polygon.length
@@ -337,7 +337,7 @@ def parted(a, b, rules, book):
 
 
 def without(large, small, kind, rules, book):
-    """What is left of one floe without the area of another."""
+    """The parts of one floe outside another."""
     knife = small.polygon.buffer(rules.gap + rules.reach, join_style=2)
     parts = [trimmed(p, rules.tolerance) for p in parts_of(large.polygon.difference(knife))]
     book.note(kind, f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
@@ -376,7 +376,7 @@ def trimmed(polygon, tolerance):
 
 
 def hull_of_shapes(shapes):
-    """Polygon around all shapes that have a place in the plane: of outlines nothing else says what was looked at."""
+    """Polygon around all shapes with a place in the plane: the only information in outlines about the area observed."""
     from shapely.geometry import MultiPoint
     places = np.concatenate([vertices(s.geometry) for s in shapes])
     return MultiPoint(places[np.isfinite(places).all(axis=1)]).convex_hull

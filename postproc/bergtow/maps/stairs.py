@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: MIT
 """Shores that were drawn along pixels: from a staircase to the shore with the fewest bays that the pixels allow.
 
-    straight(polygon)       a polygon along pixels, in columns and rows, with such a shore; None: of it nothing is left
+    straight(polygon)       a polygon along pixels, in columns and rows, with such a shore; None: nothing is left of it
     lattice(polygons)       the pixels of outlines that were traced along them; None: they were not
     retraced(polygon, pixel)        such an outline with that shore; None: it has no staircase
 
-Across each unit step of a staircase the shore lies somewhere within half a pixel of its middle: between the pixel of
-ice and that of water which the step parts. The shortest ring through all these gates, in turn, bends only where it must
-[minimum-perimeter polygon: Sklansky, Chazin & Hansen 1972, IEEE Trans. Comput. C-21, 260], found as a string is pulled
-tight [funnel: Lee & Preparata 1984, Networks 14, 393]. So a shape whose pixels are those of a convex one is convex, and
-every bay that stays is one that the pixels prove.
+Across each unit step of a staircase the shore lies somewhere within half a pixel of its middle: between the pixels of
+ice and water on both sides of the step. The shortest ring through all these gates, in turn, bends only where it must
+[minimum-perimeter polygon: Sklansky, Chazin & Hansen 1972, IEEE Trans. Comput. C-21, 260], found by pulling a string
+tight [funnel: Lee & Preparata 1984, Networks 14, 393]. So a shape with the pixels of a convex shape is convex, and the
+pixels prove every bay that stays.
 
 The ring lies against the ice on capes and against the water in bays. So its edges move back, on capes out and in bays
-in, each as far as its gates leave room and all by the same way, until the area is that of the pixels. They keep their
-directions, and so no corner turns the other way. What of the area this leaves open, some hundredths of a pixel along
-the shore, more for the smallest floes, all edges share.
+in, all by the same distance but each no farther than its gates allow, until the area is that of the pixels. They keep
+their directions, so no corner turns the other way. All edges share the remaining difference of the area, some
+hundredths of a pixel along the shore, more for the smallest floes.
 
 Rejected: Douglas & Peucker, which keeps corners of the staircase and with them its bays; convex hulls where they are
-near enough, which say nothing of a floe with one bay.
+near enough, which do not help a floe with one bay.
 """
 import numpy as np
 

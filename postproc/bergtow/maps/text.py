@@ -74,8 +74,9 @@ def change_lines(book):
 
 
 def numbers(floes, rectangle, ground, refers_to, share):
-    """What the floes are together. rectangle: (x0, x1, y0, y1) along the axes; ground: what the concentration refers
-    to, m² and in words; share: of the rectangle that was imaged, or else lies in the hull of the outlines."""
+    """Numbers of all floes together. rectangle: (x0, x1, y0, y1) along the axes; ground, refers_to: the area that the
+    concentration refers to, m² and in words; share: of the rectangle that was imaged, or else lies in the hull of the
+    outlines."""
     areas = np.array([f.polygon.area for f in floes])
     size = np.sqrt(4 * areas / np.pi)
     convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)

@@ -34,7 +34,7 @@ def body_place(run, frame):
 
 
 def panel_words(run, label, frame, follow):
-    """What stands over a panel: label, time, and where the body is in a view that goes with it."""
+    """The title of a panel: label, time, and the place of the body in a view that follows it."""
     words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
     if label:
         words.insert(0, label)

@@ -2,7 +2,7 @@
 """A film of a run: the ice field above, the ice resistance up to the moment below. MP4 through ffmpeg, GIF through
 Pillow.
 
-What stands still is drawn once; per frame only floes, bodies and the moving parts of the curve are drawn over it
+Parts that do not move are drawn once; per frame only floes, bodies and the moving parts of the curve are drawn over it
 (a full redraw spends most of its time on text and ticks).
 """
 import subprocess

@@ -211,7 +211,7 @@ def draw(run, top=None):
 
 
 def draw_diagnostics(run):
-    """The solver in every sample: contacts, sweeps, residual, overlap, and what has been registered beside them."""
+    """The solver in every sample: contacts, sweeps, residual, overlap, and series registered beside them."""
     rows = [(name, run.label(name), style.PANELS[k % len(style.PANELS)])
             for k, name in enumerate(run.by_role("diagnostic"))]
     if not rows:

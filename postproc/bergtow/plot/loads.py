@@ -91,12 +91,12 @@ def draw_return_line(axes, x, label, colour, factor, beside):
 
 
 def by(conversions):
-    """Words for what a peak of a collision means, of the conditions of one picture."""
+    """The meaning of a collision's peak in words, for the conditions of one picture."""
     return next(iter(conversions)) if len(conversions) == 1 else "each condition by its own impact.conversion"
 
 
 def meaning(some):
-    """Words for what a value of a load is: its collisions and time scale, of the conditions of one picture."""
+    """The meaning of a load's value in words: its collisions and time scale, for the conditions of one picture."""
     conversions = {x["conversion"] for x in some if x["conversion"]}
     scales = sorted(x["time_scale_s"] for x in some)
     over = f"{scales[0]:.3g}" if scales[-1] < 1.001 * scales[0] else f"{scales[0]:.3g} to {scales[-1]:.3g}"

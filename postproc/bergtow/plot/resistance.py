@@ -183,8 +183,8 @@ def table(points):
 
 
 def words(points):
-    """The rows as sentences: what the ice of each concentration adds, and the estimates meant for it; at last what
-    open water takes."""
+    """The rows as sentences: the force that the ice of each concentration adds, with the estimates valid for it; at
+    last the drag in open water."""
     def of(estimates, row):
         return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
                          if row["valid"].get(name) and np.isfinite(row["forces"][name]))
@@ -213,7 +213,7 @@ def words(points):
 
 
 def draw_estimates(axes, points, factor):
-    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for the range of one that gives a
+    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for an estimate that gives a
     range."""
     first = points[0]
     valid = first.conditions["curves"]["valid_range"]
@@ -246,7 +246,7 @@ def draw_estimates(axes, points, factor):
 
 
 def limits(points, log):
-    """Lower and upper end of the force axis, N: the runs, and the estimates that are meant for what was run."""
+    """Lower and upper end of the force axis, N: the runs, and the estimates that are valid for them."""
     seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
     for p in points:
         for e in p.of_ice.values():
@@ -326,7 +326,7 @@ def draw_runs(axes, points, factor, low, log):
 
 
 def write_around(figure, points, lost, hidden):
-    """Heading and notes. lost: legends of what is beyond the axes; hidden: runs that are."""
+    """Heading and notes. lost: legends of curves beyond the axes; hidden: runs beyond the axes."""
     e = points[0].conditions
     figure.text(
         0.02,

@@ -23,7 +23,7 @@ COLOURS = ("speed", "force", "thickness", "generation")
 
 
 class Colouring:
-    """What the floes are coloured by: values of a frame, colour map, limits over the frames shown, label."""
+    """The quantity by which floes are coloured: values of a frame, colour map, limits over the frames shown, label."""
 
     def __init__(self, run, kind, frames):
         self.run, self.kind = run, kind
@@ -92,7 +92,7 @@ def _round_steps(top):
 
 
 def tow_heading(run, time=0.0):
-    """Unit vector (x, y) of the leg on which the towing end is at a time, or None for a body that drifts."""
+    """Unit vector (x, y) of the leg of the towing end at a time, or None for a body that drifts."""
     if run.towed is None or run.case.get("tow.mode") == "none":
         return None
     passed = sum(e["kind"] == "waypoint" and e["time_s"] <= time for e in run.events)
@@ -198,7 +198,7 @@ class Scene:
         axes.set_xlabel(names[0])
         axes.set_ylabel(names[1])
 
-        # Walls go on without end along a periodic direction; a view about the body may look over the seam.
+        # Walls continue without end along a periodic direction; a view about the body may look over the seam.
         px, py = run.period if follow else (0.0, 0.0)
         self._images = [
             np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))

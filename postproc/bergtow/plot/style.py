@@ -49,7 +49,7 @@ REFERENCE = "#000000"
 HALO = "#fefefe"
 ON_DARK, ON_LIGHT = "#fefefe", "#1d2732"
 JAM = "#c1121f"
-#: {colour: what it is on a dark page}; all others are the same there
+#: {colour: its replacement on a dark page}; all others stay the same there
 DARK = {
     PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
     ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
@@ -63,7 +63,7 @@ FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#
 #: floes by thickness: thin ice is grey-blue, thick ice is white, as from an aircraft
 THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
 
-#: by what a body is towed, in words, and by how much of it the speed made good may be another than the one ordered
+#: the tow in words by its mode, and the relative difference of speed made good and ordered speed that is not mentioned
 TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
 
 DPI = 150
@@ -102,7 +102,7 @@ scale, short, quantity = text_table.scale, text_table.short, text_table.quantity
 
 
 def conditions(run):
-    """What was run, in a few words: concentration, thickness, number of floes, tow."""
+    """The run in a few words: concentration, thickness, number of floes, tow."""
     words = []
     concentration = run.number("concentration", run.value("ice.concentration"))
     if run.n_floes and np.isfinite(concentration):
@@ -134,8 +134,8 @@ def title(run):
 
 
 class LogTicks(Locator):
-    """Ticks of a logarithmic axis, each of which is labelled: decades; where fewer than three are in sight, also their
-    3, or 2 and 5, or most digits; evenly spaced ones over less than that."""
+    """Labelled ticks of a logarithmic axis: decades; if fewer than three are in sight, also their 3, or 2 and 5, or
+    most digits; over a shorter range evenly spaced ticks."""
 
     CHOICES = ((1, ), (1, 3), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7))
     MOST = 8
@@ -203,8 +203,8 @@ def in_sight(axes, line):
 
 
 def legend_of(axes):
-    """(handles, labels) of what is in sight, and the labels of which nothing is. Limits must be set. Of lines with the
-    same label the first in sight stands for all."""
+    """(handles, labels) of the artists in sight, and the labels without any in sight. Limits must be set. The first
+    line in sight stands for all lines with its label."""
     shown, all_labels = {}, {}
     for handle, label in zip(*axes.get_legend_handles_labels()):
         all_labels[label] = None

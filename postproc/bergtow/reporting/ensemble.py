@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the report of an ensemble says: the tables of bergtow statistics, the pictures of bergtow plot-ensemble, and
-every member with its doubts.
+"""The contents of the report of an ensemble: the tables of bergtow statistics, the pictures of bergtow plot-ensemble,
+and every member with its doubts.
 
 The tables come from text/ensemble.py as Markdown, so that the page, the terminal and the README of a study say the
 same.
@@ -89,7 +89,7 @@ def sections(markdown):
     return intro, [part for part in parts if part[0] != "Members"]
 
 
-MARGIN = 1.05  # times the largest value simulated: what is less has little room for what was not seen
+MARGIN = 1.05  # times the largest value simulated: a lower design value leaves little room for loads not seen
 #: marks behind a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
@@ -154,7 +154,7 @@ def answer(e, s, cases, results, told=None):
 
 
 def governing(s):
-    """The condition with the largest design value in a sentence, with its tonnes-force, in which vessels are rated."""
+    """The condition with the largest design value in a sentence, also in tonnes-force, the unit of vessel ratings."""
     some = [c for c in s["conditions"] if c["design"]["tow"] and "value" in c["design"]["tow"]]
     if not some:
         return "No condition has a design tow force."
@@ -169,7 +169,7 @@ def governing(s):
     said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
              f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
     if np.isinf(high):
-        said += ": these fields do not know how far the tail reaches, and it is no value to build on"
+        said += ": these fields do not determine the length of the tail, so do not use the value for a design"
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
                    if statement.start_exceeds(d) else ".")
 
@@ -192,7 +192,7 @@ def kind_of(warning):
 
 
 def members(e, s):
-    """Rows of all members: what was varied, status, mean, doubts, state hash, warnings in words."""
+    """Rows of all members: varied keys, status, mean, doubts, state hash, warnings in words."""
     labels = {c.index: c.label for c in e.conditions()}
     by_name, out = {row["name"]: row for row in s["members"]}, []
     for m in range(e.n):
@@ -287,7 +287,7 @@ def of_part(name, part):
     return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
 
 
-#: what stands in place of a chapter that has not been made
+#: text in place of a chapter that has not been made
 NOT_STUDIED = {
     "converge": "Not studied: whether the result depends on width and length of the domain, time step, tolerance and "
                 "start is not known. bergtow converge CASE.yml examines it.",
@@ -297,22 +297,22 @@ NOT_STUDIED = {
 
 
 def doubt(name, found, folder, texts):
-    """Why what a command found is not of these members (texts: compared.cases of them), or no longer of the ensemble
-    in its folder; "" where it is."""
+    """Why the result of a command does not belong to these members (texts: compared.cases of them), or no longer to the
+    ensemble in its folder; "" if it does."""
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
     if name == "converge" and (at := compared.alone(found, texts)):
         return f"studied at {at} alone: of the other tows of this report it says nothing"
     try:
         why = compared.stale(found, Members(folder)) if name == "budget" else ""
-    except RunError:  # the folder holds what was found alone
+    except RunError:  # the folder holds the result alone
         return ""
     return f"out of date, {why}: call bergtow budget again" if why else ""
 
 
 def results_beside(e, also):
-    """{name: what a command of study/analysis.py left in the first of the folders that has it, with "doubt"}; folders:
-    that of the ensemble, and others."""
+    """{name: result of a command of study/analysis.py, with "doubt"}, from the first folder that has it: that of the
+    ensemble, then those of `also`."""
     texts, out = compared.cases(e), {}
     for name in analysis.KINDS:
         for folder in (e.path, *also):
@@ -369,8 +369,8 @@ def varied(e, runs):
 
 
 def ranges(results, told):
-    """{key: (range, its source)} of what the uncertainty budget varied, or the answer of bergtow design, whose own
-    table has the sources."""
+    """{key: (range, its source)} of the values that the uncertainty budget varied, or that the answer of bergtow design
+    has; there a separate table has the sources."""
     out = {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])}
     for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How the numbers of a report came about, and what they cannot know: method, model and limits in words, each sentence
-from what was simulated."""
+"""How the numbers of a report were computed, and their limits: method, model and limits in words, each sentence chosen
+by the simulated cases."""
 import numpy as np
 
 from bergtow.result import compared
@@ -32,7 +32,7 @@ def _fields(s, cases):
 
 
 def _amount(s, cases):
-    """What was simulated, in a sentence."""
+    """The amount of simulation, in a sentence."""
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     n = sum(c["members"]["used"] for c in s["conditions"])
     said = f"{n} tows in {len(s['conditions'])} conditions{_fields(s, cases)}"
@@ -100,7 +100,7 @@ def _pack(case):
 
 
 def _end(case):
-    """What the towing end does."""
+    """The motion of the towing end, in a sentence."""
     return {
         "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
                  "the tow force holds no dynamics of the line.",
@@ -119,8 +119,8 @@ def _vessel(case):
 
 
 def limits(cases, vessel=False):
-    """Sentences on what the model leaves out, the gravest first; what is not so of all cases, with its conditions.
-    cases: those of statement.cases(); vessel: is one judged?"""
+    """Sentences on the limits of the model, the gravest first; a limit that does not hold for all cases names its
+    conditions. cases: those of statement.cases(); vessel: is a vessel judged?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if not cases:
@@ -195,9 +195,9 @@ def _capability(found):
 
 
 def _convergence(found, e):
-    """What converge.json says in one line of the values that the case has: what matters, what does not, what stayed
-    open, what was compared at another value alone. A quantity has one verdict: of 2 s against 1 s, if 2 s is the time
-    step of the case, and not that of 1 s against 0.5 s as well."""
+    """One line on converge.json for the values of the case: quantities that matter, that do not, that stayed open, and
+    that were compared at other values only. A quantity has one verdict: if the time step of the case is 2 s, that of 2
+    s against 1 s, and not that of 1 s against 0.5 s as well."""
     texts = compared.cases(e)
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
@@ -211,7 +211,7 @@ def _convergence(found, e):
 
 
 def beyond(results, e):
-    """Rows (what, value) of what other commands found, for the answer: {name: found}. e: Ensemble."""
+    """Rows (what, value) of the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(

@@ -49,8 +49,8 @@ def thinned(n, most):
 
 def read_frames(run, frames, floes):
     """(x, y, yaw, speed, force), each [T, N], of some floes in some frames; positions wrapped into the domain. And
-    lives [N, 2]: the first frame, as a place in frames, in which a floe is there, and the first after it in which it is
-    not. Where it is not it has the numbers of the frame next to it."""
+    lives [N, 2]: the first frame, as an index into frames, that has the floe, and the first one after it without the
+    floe. In frames without it a floe has the numbers of the nearest frame with it."""
     out = np.empty((5, len(frames), len(floes)))
     lives = np.tile([0, len(frames)], (len(floes), 1))
     for k, frame in enumerate(frames):
@@ -101,7 +101,7 @@ class Replay:
 
     head    dict for JSON: everything but the large arrays
     blobs   {name: base64 text}
-    notes   sentences on what was left out or rounded
+    notes sentences on omissions and rounding
     Errors: RunError.
     """
 
@@ -198,8 +198,8 @@ class Replay:
         self.blobs["lives"] = pack(self.lives.astype(np.uint32), self.compress)
 
     def _colourings(self, frames):
-        """What the floes can be coloured by: label, upper and lower limit in SI, power of the scale, 64 colours; as in
-        the pictures."""
+        """Quantities by which floes can be coloured: label, upper and lower limit in SI, power of the scale, 64
+        colours; the same as in the pictures."""
         run, out = self.run, []
         kinds = [("speed", "speed"), ("force", "contact force")]
         if run.n_floes and np.ptp(run.thickness) > 1e-9 * run.thickness.max():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the report of one run says: its numbers in words, its tables, its pictures. postproc/page/run.html sets it."""
+"""The contents of the report of one run: numbers in words, tables, pictures. reporting/page/run.html is its
+template."""
 import re
 from dataclasses import replace
 
@@ -100,7 +101,7 @@ def pictures(run):
 
 
 def start_peak(run, key="start_peak_line_tension_n"):
-    """What was the largest before the window, in words."""
+    """The largest value before the window, in words."""
     before = run.number(key)
     return f"; in the start before it {force(before)}" if np.isfinite(before) else ""
 
@@ -112,7 +113,7 @@ def ice_start_peak(run):
 
 
 def figures(run):
-    """The few numbers at the head of the page: (label, number, what stands below it)."""
+    """The few numbers at the head of the page: (label, number, text below it)."""
     if run.towed is None:
         return []
     n = run.number

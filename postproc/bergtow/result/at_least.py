@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads of which only the least is known, since steps behind them have no solution: numbers that print as "at least".
+"""Loads with a known lower bound only, since some of their steps have no solution: numbers that print as "at least".
 
 In such a step the load has no bound (docs/theory.md, locked bodies). The last load before it stands in its place, so
 a mean, a peak, a quantile or a share of the time above a level is a lower bound. It has no interval, since nothing
@@ -13,7 +13,7 @@ import re
 
 import numpy as np
 
-#: numbers of summary.json by path: the loads of ice, what is held against them, and what measures their scatter
+#: numbers of summary.json by path: the loads of ice, the numbers compared with them, and the measures of their scatter
 LOADS = re.compile(r"(mean|p95|p99|peak)_ice_resistance_n|window\.series\.ice_resistance\.(mean|peak|start_peak)_n|"
                    r"window\.series\.ice_resistance\.quarters_n\.|"
                    r"impacts\..*_n|reference\.ratio|estimates\..*\.simulated_over_estimate")
@@ -56,7 +56,7 @@ def ended(why):
 
 
 def words(share):
-    """What stands beside such numbers, once a page."""
+    """The note for such numbers, once a page."""
     return f"in {100 * share:.2g} % of the steps the load has no bound"
 
 
@@ -115,7 +115,7 @@ def _panels(p, share):
 
 def condition(c, why, share, bounded):
     """The statistics of a condition as lower bounds: those of its loads but `bounded`, names of those that a line
-    bounds. why: what stands where a tail would."""
+    bounds. why: the reason given in place of a tail."""
     refused = {"refused": why}
     extremes = c["extremes"] if "refused" in c["extremes"] else c["extremes"] | {
         "collisions_per_hour": _number(c["extremes"]["collisions_per_hour"], share),

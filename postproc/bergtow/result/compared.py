@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What converge.json says of another study: of the value of each quantity that this study itself runs with, and not of
-any other that was tried.
+"""Use converge.json for another study: only its rows for the values that this study runs with, and not for the other
+values that were tried.
 
 A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
-So what the computation does to a study is told by the rows from that on whose `from` is the study's own value.
+So the numerical error of a study follows from the row whose `from` is the study's value, and from the rows after it.
 """
 import hashlib
 
@@ -111,7 +111,7 @@ def state(e):
 
 
 def stale(found, e):
-    """Why what was found by state(e) is not that of this ensemble any more, "" where it is, or does not say."""
+    """Why a result with state(e) no longer belongs to this ensemble; "" if it does, or has no state."""
     now = state(e)
     if found.get("study", now["study"]) != now["study"]:
         return "of another study than its folder holds"
@@ -120,7 +120,7 @@ def stale(found, e):
 
 
 def _beside(found, texts):
-    """(key, its text in what was found, those of the members' cases) of what makes another case."""
+    """(key, its text in the result, its texts in the members' cases) of the keys that make another case."""
     for key, value in (found.get("values") or {}).items():
         some = list(dict.fromkeys(text[key] for text in texts if key in text))
         if some and key.startswith(PHYSICAL) and key not in PLACES:
@@ -136,8 +136,8 @@ def _among(value, some):
 
 
 def misfit(found, texts):
-    """Why what was found is of another case than the members' (texts of cases()), "" where it is not, or does not say
-    of which it is: a key of the ice, the body, the tow, water or air is not as in any of them."""
+    """Why a result belongs to another case than the members (texts of cases()): a key of the ice, the body, the tow,
+    water or air has a value that none of them has. "" if it belongs to them, or does not name its case."""
     for key, value, some in _beside(found, texts):
         if not _among(value, some):
             return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
@@ -145,7 +145,7 @@ def misfit(found, texts):
 
 
 def alone(found, texts):
-    """Of which of several values of the members what was found speaks: "ice.concentration 0.8", "" where they have no
-    other."""
+    """The values of a result where the members have several: "ice.concentration 0.8"; "" if the members have no
+    others."""
     return ", ".join(f"{key} {value}" for key, value, some in _beside(found, texts)
                      if any(_differ(value, text) for text in some))

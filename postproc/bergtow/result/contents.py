@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""List what the output folder of a run holds: counts, summary, series with units."""
+"""List the contents of the output folder of a run: counts, summary, series with units."""
 
 from bergtow.result.run import Run
 

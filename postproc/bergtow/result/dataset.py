@@ -59,13 +59,13 @@ class Result:
         return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
 
 
-#: what a notebook shows of a run, where it is in the summary
+#: numbers of the summary that a notebook shows
 _SHOWN = ("title", "n_floes", "concentration", "sim_time_s", "mean_ice_resistance_n", "mean_tow_force_n",
           "peak_tow_force_n", "mean_line_tension_n", "unconverged_steps", "state_hash")
 
 
 def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """(name, text) of what a notebook shows; ± is one standard error, as in the report."""
+    """(name, text) of the numbers that a notebook shows; ± is one standard error, as in the report."""
     yield "verdict", html.escape(str(summary.get("window", {}).get("verdict")))
     for name in _SHOWN:
         value = summary.get(name)
@@ -154,7 +154,7 @@ _POSE = (("x", "m", "x of the centroid"), ("y", "m", "y of the centroid"), ("yaw
 
 
 def _dims(dataset: h5py.Dataset) -> tuple[str, ...] | None:
-    """Names of the dimensions of a dataset by its scales, None for one that has none."""
+    """Names of the dimensions of a dataset by its scales, None for a dataset without scales."""
     if all(len(axis) for axis in dataset.dims):
         scales = [axis[0].name for axis in dataset.dims]
         return tuple(_DIMENSIONS.get(name, name.lstrip("/")) for name in scales)
@@ -166,9 +166,9 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
 
     Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event, and
     panel of the hull where the case has them. Series have their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
-    floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices are what the
-    groups of result.h5 hold. Every variable has units, long_name and, where it has one, a label. Values are read from
-    the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
+    floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices come from the
+    groups of result.h5. Every variable has units, long_name and, where it has one, a label. Values are read from the
+    file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
     BergtowError.
     """
     xarray, _ = _imported("xarray"), _imported("h5py")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def read(name, place):
-    """What a command left in a folder, or in a file of another name; None where there is nothing, or it cannot be
+    """The result of a command in a folder, or in a file of another name; None if there is none, or it cannot be
     read."""
     path = Path(place)
     try:

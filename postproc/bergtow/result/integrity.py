@@ -29,7 +29,7 @@ def keep(folder, name, made_by):
 
 
 def fault_of_member(folder, name, made_by):
-    """Why the files of a finished run are not what it left, or None."""
+    """The fault in the files of a finished run, compared with its record; None if they are sound."""
     try:
         _library.library().bt_record_check(os.fsencode(folder), name.encode(), made_by, len(made_by))
     except BergtowError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Read the folder of an ensemble: its members, what was varied, their summaries, series, collisions and doubts.
+"""Read the folder of an ensemble: its members, the varied keys, summaries, series, collisions and doubts.
 
     e = Members("out/concentration")
     for c in e.conditions():                       # members of one combination of values
@@ -28,7 +28,7 @@ from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 #: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean, since
-#: what comes shortly before that is the largest of all
+#: its loads shortly before that are the largest of all
 LEAST_TOW = 150.0
 
 #: kinds of doubt about a member, and what each means
@@ -44,10 +44,10 @@ DOUBTS = {
     "other": "a warning of another kind",
 }
 
-#: codes of warnings that tell of one of these; what a verdict rests on are reasons, and no warnings of their own
+#: codes of warnings about one of these; the grounds of a verdict are reasons, and not separate warnings
 TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
 
-#: doubts by which members may be left out: not that they met little ice, which would leave out the small means
+#: doubts that may exclude members: not "met little ice", which would exclude the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
 
 
@@ -70,7 +70,7 @@ class Condition:
 
 
 def reading(key, unit):
-    """(factor, unit) in which a key reads: a concentration in %, an angle in degrees; unit "" for a plain number."""
+    """(factor, unit) for printing a key: a concentration in %, an angle in degrees; unit "" for a plain number."""
     if key == "ice.concentration":
         return 100.0, "%"
     if unit in ("rad", "rad/s"):
@@ -95,7 +95,8 @@ def short_key(key):
 
 @dataclass(frozen=True)
 class WithoutBound:
-    """Tows of a condition in which nothing bounds the load in some steps, and those that ended for it."""
+    """Tows of a condition with steps without a solution, where the load has no bound, and tows that ended because of
+    them."""
 
     share: float    #: mean over the tows that finished of the share of such steps in their windows
     some: list      #: names of those that hold such steps
@@ -302,7 +303,7 @@ class Members:
         return self._warnings[int(m)]
 
     def why_unsteady(self, m):
-        """What the first reason that a member gives for its verdict stands for: the same words for the same code."""
+        """The meaning of the first reason for a member's verdict: the same words for the same code."""
         codes = [reason["code"] for reason in self._reasons[int(m)]]
         return self._meanings.get(codes[0], codes[0]) if codes else "its result does not say why"
 
@@ -363,8 +364,8 @@ class Members:
         return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(self.mean))]
 
     def holes(self):
-        """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where
-        nothing is missing."""
+        """A sentence on members of the study that are missing from the numbers although nobody excluded them; "" if
+        there are none."""
         waiting = [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound]
         kinds = (("not sound", list(self.unsound)), ("waiting", waiting),
                  ("failed", [self.name[m]
@@ -400,7 +401,7 @@ class Members:
 
     @cached_property
     def builds(self):
-        """A sentence on members of several builds, or of one that cannot be had again; "" where there is none."""
+        """A sentence on members of several builds, or of a build that cannot be reproduced; "" if there are none."""
         builds = {}
         for m in np.flatnonzero(self.status == FINISHED):
             try:

@@ -2,8 +2,8 @@
 """Where each value of a case comes from: given with a source, given and called assumed, given without a word, or a
 default.
 
-What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
-case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
+The origin of a value is the comment on its line in the case file; for a default it is the comment in the resolved case.
+Nothing is inferred: a value without a comment is shown without a source.
 """
 import re
 import shlex
@@ -16,7 +16,7 @@ import yaml
 TITLE_BLOCK = ("client", "project", "author", "document", "revision", "distribution")
 NAMES = {"document": "document number"}  #: of the title block, where the key is not the name
 
-#: kind: what the label says
+#: kind: its label
 KINDS = {
     "assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
     "set": "set",
@@ -86,9 +86,9 @@ def set_by_hand(command_line):
 
 
 def of_study(run, own):
-    """{key: what the study says beside it} of the keys that the study of a member gives to it; {} for a run of its own.
-    own: {key: value} of what it was given beside its case, {} of an older result, which does not say: there all that
-    the study gives to some member."""
+    """{key: comment in the study} of the keys that the study of a member sets; {} for a run without a study. own: {key:
+    value} set for this run beside its case; {} for a result without them: then the keys that the study sets for any
+    member."""
     folder = run.path.resolve().parent
     try:
         text = (folder.parent / "study.yml").read_text(encoding="utf-8") if folder.name == "members" else ""
@@ -137,7 +137,7 @@ def of_default(meaning):
 
 
 def source_of_ice(case):
-    """Key by which the ice was read, or None where it was made; case: {key: text}."""
+    """The key of the file that the ice was read from, or None for generated ice; case: {key: text}."""
     return next((key for key in ("ice.outlines", "ice.field") if case.get(key, "none") not in ("", "none")), None)
 
 
@@ -184,7 +184,7 @@ def values(run):
     given = annotated(run.case_text)
     own = {key[len(BESIDE):]: value for key, (value, _) in given.items() if key.startswith(BESIDE)}
     study = of_study(run, own)
-    # that of a study is of all its members; older results have no other word on what was set
+    # the command line of a study belongs to all its members; results without `own` record set values there alone
     by_hand = set_by_hand(str(run.attributes.get("command_line", ""))) | set({} if study else own)
     for key, (value, meaning) in resolved.items():
         if key in unused:
@@ -204,8 +204,8 @@ def values(run):
 
 
 def title_block(case, attributes, given):
-    """Rows (what, value) of the title block: what is given on the command line, or in the section `report` of a case,
-    {key: text}; the date, and the program by its attributes."""
+    """Rows (what, value) of the title block: values from the command line (given), or from the section `report` of a
+    case, {key: text}; the date, and the program by its attributes."""
     rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
     return [(NAMES.get(name, name), scrubbed(" ".join(value.split())) if value not in ("", "none") else "–")
             for name, value in rows] + [
@@ -238,7 +238,7 @@ def short(value):
 
 def preface(text):
     """The comment at the head of a case file, without its marks: list of paragraphs. Lines of a sentence are joined;
-    items of a list, tables and what is set in keep theirs."""
+    items of a list, tables and indented lines stay separate."""
     paragraphs = [""]
     for line in text.splitlines():
         if not line.startswith("#"):

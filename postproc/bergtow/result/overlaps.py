@@ -93,7 +93,7 @@ def _apart(a, b, b_count):
 
 
 def overlaps(outlines):
-    """Polygons in which outlines [n, k, 2], repeated corners allowed, overlap by more than the slop: pair by pair."""
+    """Polygons of the overlaps, deeper than the slop, of outlines [n, k, 2] (corners may repeat): pair by pair."""
     outlines = np.asarray(outlines, dtype=float)
     n, most = outlines.shape[:2]
     if n < 2:

@@ -179,7 +179,7 @@ class Run:
         self.attributes = {k: plain(v) for k, v in self._file.attrs.items()}
 
     def close(self):
-        """Close result.h5. What was read stays usable."""
+        """Close result.h5. Values already read stay usable."""
         self._file.close()
 
     def __enter__(self):
@@ -597,8 +597,8 @@ class Run:
 
     @property
     def impacts(self):
-        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", what a
-        peak means."""
+        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", the
+        meaning of a peak."""
         return self._once("impacts", lambda: self._group("impacts", "collisions were not told apart"))
 
     @property
@@ -659,7 +659,7 @@ class Run:
         return out
 
     def pose(self, frame):
-        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN of one that is not there."""
+        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN for a floe that is absent."""
         return self._of_floes("pose", frame)
 
     def body_pose(self, frame):

@@ -40,8 +40,8 @@ def samples(e, rows, members):
     """Samples of the steady windows of a condition: (all of them; how many are independent; every 2 tau-th above zero,
     at most MOST_SAMPLES).
 
-    All fields are thinned alike, by the median of their tau. Each by its own would give a field the weight 1/tau, and
-    one that meets no ice, whose tau is that of a constant, nearly all of it.
+    All fields are thinned alike, by the median of their tau. Thinning each field by its own tau would give it the
+    weight 1/tau, and nearly all weight to a field without contact, whose tau is that of a constant.
     """
     found = [(e.steady(m), members[m]["tau_samples"]) for m in rows]
     every = [x for x, _ in found if len(x)]
@@ -152,12 +152,12 @@ def condition(e, c, members, options):
 
 
 def sample(e, means):
-    """({parameter that is varied: [n]}, mean ice resistance [n], what the n are). means: by member.
+    """({varied parameter: [n]}, mean ice resistance [n], the kind of the n in words). means: by member.
 
-    Of a Latin hypercube the means of its conditions are the sample. The fields of a condition share what the parameters
-    leave unexplained of it; counted one by one they gave a parameter without effect an interval that excludes 0 in
-    58 % of 95 % intervals (10 conditions of 8 fields). In a grid all levels meet all others, and what one parameter
-    does cancels in the effect of another: there it was 0 to 6 %, so the members are the sample.
+    For a Latin hypercube the means of its conditions are the sample. The fields of a condition share the part of it
+    that the parameters do not explain; counted one by one they gave a parameter without effect an interval that
+    excludes 0 in 58 % of 95 % intervals (10 conditions of 8 fields). In a grid all levels meet all others, and what one
+    parameter does cancels in the effect of another: there it was 0 to 6 %, so the members are the sample.
     """
     groups = [c.finished for c in e.conditions() if len(c.finished)] if e.sampled else [[m] for m in e.used]
     first = np.array([g[0] for g in groups], dtype=int)
@@ -166,8 +166,8 @@ def sample(e, means):
 
 
 def sensitivity(e, members):
-    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was
-    varied.
+    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over the varied
+    parameters.
 
     Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be
     predicted.

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The design statement of an ensemble: for each condition the tow force that is exceeded with a stated probability in a
-tow of stated length, its interval over fields, what it holds for, and what speaks against it.
+tow of stated length, its interval over fields, the conditions that it holds for, and warnings.
 
     p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
-Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
-domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a start-up,
-which no number holds, that takes more than the value, fields that are not alike.
+Warnings are facts about the model or the sample that an interval does not include: rigid floes without a largest force,
+a domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a
+start-up (not part of any number) that takes more than the value, fields that are not alike.
 """
 from dataclasses import dataclass
 
@@ -36,19 +36,19 @@ DOUBTFUL = {
     "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
     "stopped": "members that stopped early"
 }
-#: what stands in the line of what the values hold for: case key, words in front and behind
+#: the line of conditions that the values hold for: case key, words before and after its value
 HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
              ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
              ("tow.speed", "", ""), ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
 TOWED = {"speed": " prescribed", "line": " of the towing end of the line", "thrust": " asked of the vessel"}
-#: what moves water and air: words where all keys are at zero, and these keys
+#: keys of current and wind, with the words for the case that all of them are zero
 STILL = {"no current": ("water.current_x", "water.current_y", "water.tide.major", "water.current_table"),
          "no wind": ("air.wind_x", "air.wind_y", "air.wind_table")}
 
 
 @dataclass(frozen=True)
 class Case:
-    """What a statement has to know of a condition's case."""
+    """The facts of a condition's case that a statement needs."""
 
     rigid: bool            #: nothing limits the force of a floe
     jams: bool             #: its rigid floes are so dense that they jam
@@ -137,7 +137,7 @@ def domain(e, rows):
 
 
 def _of_the_case(e, rows, case, tow):
-    """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
+    """Warnings that follow from the simulated case: pairs of the problem and its amount."""
     out = []
     if case is None:
         out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
@@ -311,7 +311,7 @@ def _of_the_models(load):
 
 
 def statement(e, rows, c):
-    """What the design statement says of a condition c, a dict of bergtow statistics: {"tow", "tension", "branches",
+    """The design statement of a condition c, a dict of bergtow statistics: {"tow", "tension", "branches",
     "warnings", "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
     there = np.flatnonzero(e.condition == c["index"])
     towed = e.tows(there, excluded=False)  # those too whose line parted before the window, which are not among the rows
@@ -320,7 +320,7 @@ def statement(e, rows, c):
     tensions = [(load["design"], load) for load in found.values()
                 if load["needs"] in loads.LINE and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
-    # a branch without a value may bear more than the one that has one
+    # a branch without a value may bear more than the branch with one
     if worst and any(load["largest"] > worst[0]["value"] for load in found.values()
                      if load["needs"] in loads.LINE and "value" not in load["design"]):
         worst = None
@@ -336,7 +336,7 @@ def statement(e, rows, c):
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
     for load in found.values() if len(rows) else ():
-        if load["needs"] in loads.LINE:  # what is said of the sample of the tow force holds here, too
+        if load["needs"] in loads.LINE:  # warnings about the sample of the tow force hold here, too
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, case, lines) + warned
@@ -358,8 +358,8 @@ def statement(e, rows, c):
 
 
 def _moved(e, case):
-    """What moves water and air, in words: "no current", or what the case says of it, where the study does not vary it.
-    A value without its current holds for another speed through the water than that of the tow."""
+    """Current and wind in words: "no current", or the values of the case, where the study does not vary them. They must
+    be stated, because a current changes the speed of the tow through the water."""
     for words, keys in STILL.items():
         there = [key for key in keys if case.texts.get(key, "none").split(" ")[0] not in ("0", "none")]
         if there:

@@ -3,7 +3,7 @@
 return levels with intervals.
 
 A field is a dict: time s [n] and peak [n], in order, start s, hours. The peaks are those of collisions, or all samples
-of a signal (stats/load.py): what follows is the same, since clusters count and not samples.
+of a signal (stats/load.py); both are treated alike, since clusters count and not samples.
 
 A level z of return time T hours of tow is exceeded once in T hours on the average.
     empirical        rate(z) = number of peaks above z / hours
@@ -12,14 +12,14 @@ A level z of return time T hours of tow is exceeded once in T hours on the avera
                      is GPD of scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
 [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
 Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
-A level that is exceeded with probability p in a tow of T hours is that of the return time T / -ln(1 - p), since
-clusters far up come like a Poisson process.
+A level that is exceeded with probability p in a tow of T hours has the return time T / -ln(1 - p), since clusters at
+high levels come like a Poisson process.
 
 Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stats/profile.py).
-With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
-tail itself, and the threshold, are assumed, and fields that are alike (stats/alike.py). Below a shape of -1/2 maximum
-likelihood is irregular [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak,
-and so are the levels; this is reported.
+With fewer fields than that needs, by the likelihood alone. Either is a lower bound of the uncertainty: the model of the
+tail, the threshold, and that fields are alike (stats/alike.py) are assumed. Below a shape of -1/2 maximum likelihood is
+irregular [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the
+levels; this is reported.
 
 A load that something limits - a thrust at the bollard pull - stays at its largest value. Such a sample has no tail, and
 is refused in words. Values that differ by rounding alone are the same (TIE): in a moving mean of such a signal they
@@ -34,15 +34,15 @@ from bergtow.stats import profile as stat_profile
 LEAST_EXCESSES = 30
 LEAST_BLOCKS = 20
 SHARE = 0.1          # of the peaks above the threshold, or more, until there are LEAST_EXCESSES clusters
-IRREGULAR = -0.5     # shape below which the likelihood is irregular
-EMPTY = 0.05         # share of blocks without a peak above which there is no GEV
+IRREGULAR = -0.5     # shape: below this value the likelihood is irregular
+EMPTY = 0.05         # share of blocks without a peak: above this value no GEV is fitted
 RESAMPLES = 199       # of the p-values
-TIE = 1e-9           # of the largest value: what differs by less is the same
-SATURATED = 0.1      # share of the clusters at one largest value from which on it is a limit, and the excesses no GPD
+TIE = 1e-9           # of the largest value: values that differ by less are the same
+SATURATED = 0.1      # share of the clusters at the largest value: from here on it is a limit, and excesses are no GPD
 
 
 def tie(peak):
-    """What peaks that are the same may differ by."""
+    """Largest difference of peaks that count as the same."""
     return TIE * float(np.abs(peak).max(initial=0.0))
 
 
@@ -52,7 +52,7 @@ def exceeds(peak, level):
 
 
 def commonest(values):
-    """(the value that most of these are but for rounding, how many)."""
+    """(the most frequent of these values, but for rounding, and its count)."""
     x = np.sort(values)
     starts = np.flatnonzero(np.concatenate([[True], np.diff(x) > tie(x)]))
     counts = np.diff([*starts, len(x)])
@@ -61,7 +61,8 @@ def commonest(values):
 
 
 def saturated(values, what):
-    """Why values are no sample of a tail: SATURATED of them are the largest; "" where not. what: they, in words."""
+    """Why values are no sample of a tail: more than the share SATURATED of them are the largest; "" if not. what: the
+    values, in words."""
     top = values.max(initial=-np.inf)
     there = int(np.sum(values >= top - tie(values)))
     return f"saturated at {top:.4g} N, which {there} of {len(values)} {what} reach and none exceeds" \
@@ -270,9 +271,9 @@ SHORT = 0.5  # of the middle one of the fields by length: shorter ones do not se
 
 
 def _blocks(fields, blocks):
-    """(maxima of the blocks of each field, hours of a block). Blocks are of one length: so many in the shortest of the
-    fields that are at least half as long as the middle one. What a field has beyond its whole blocks is left out, and
-    so are fields that have none."""
+    """(maxima of the blocks of each field, hours of a block). All blocks have one length: a whole number of them fits
+    the shortest of the fields that are at least half as long as the median. The rest of a field after its last whole
+    block is left out, and so are fields without a whole block."""
     hours = np.array([f["hours"] for f in fields])
     length, out = float(hours[hours >= SHORT * np.median(hours)].min()) / blocks, []
     for f in fields:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The largest of n tows, and what it is worth where no tail can be fitted: distribution-free.
+"""The largest of n tows, and its confidence where no tail can be fitted: distribution-free.
 
-The largest values of n tows in fields of their own are independent and alike. Whatever their distribution F, as long as
-it is continuous, the chance that all n stay below its quantile of the share p is p^n. So with confidence 1 - p^n at
-least the share p of all tows of that length stay below the largest of the n, and the next tow does so with probability
-n / (n + 1). Rejected: a normal quantile of the n values, which is narrower, but assumes what nobody has looked at.
+The largest values of n tows in separate fields are independent and identically distributed. Whatever their distribution
+F, as long as it is continuous, the chance that all n stay below its quantile of the share p is p^n. So with confidence
+1 - p^n at least the share p of all tows of that length stay below the largest of the n, and the next tow does so with
+probability n / (n + 1). Rejected: a normal quantile of the n values, which is narrower, but assumes a distribution that
+was not checked.
 """
 import math
 
@@ -29,7 +30,7 @@ def tows_for(share, level=CONFIDENCE):
 
 
 def largest_of(values, hours):
-    """What the largest of the tows says. values: the largest of each [n]; hours: of each window [n].
+    """The statement on the largest of the tows. values: the largest of each [n]; hours: of each window [n].
     {"n", "n_tows", "hours_each", "confidence", "share_below", "chance_next_below"}."""
     n = len(values)
     return {"n": float(np.max(values)), "n_tows": n, "hours_each": float(np.median(hours)), "confidence": CONFIDENCE,

@@ -90,8 +90,8 @@ def start_up(time, x, start, end, scale):
 
 
 def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
-    """95 % interval of a value between low and high, from what it is without each of the fields; NaN ends for one.
-    scale: (function, its inverse), on which it is symmetric wherever that is finite."""
+    """95 % interval of a value between low and high, from its values without each of the fields; NaN ends for a single
+    field. scale: (function, its inverse); the interval is symmetric in the function wherever that is finite."""
     n, without = len(without), np.asarray(without)
     if n < 2 or not np.isfinite([value, *without]).all():
         return np.nan, np.nan
@@ -136,8 +136,8 @@ def constant(fields):
 
 
 def gap_of(fields):
-    """Time without exceedance that ends a cluster, s: two correlation times of the fields in which the signal changes,
-    a time scale at least."""
+    """Time without exceedance that ends a cluster, s: two correlation times of the fields with a signal that changes, a
+    time scale at least."""
     taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields if not constant([f])]
     return float(max(2 * np.nanmedian(taus) if taus else 0.0, max(f["scale"] for f in fields)))
 

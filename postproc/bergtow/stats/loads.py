@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""The loads of an ensemble that something is designed for, member by member and condition by condition.
+"""The design loads of an ensemble, member by member and condition by condition.
 
     tow_force, ice_resistance     and every series that the program registers as a load of line or vessel
     floe_force                    largest force of one floe on the hull in a step, or the peak of a collision
     panel_load                    load on that panel of the hull where it is largest (cases with output.panels)
 
-Names, units and labels come from the members' files. All but floe_force are filtered (stats/load.py); that one is
-local, acts for as long as a collision does, and is what it is by impact.conversion, which is named.
+Names, units and labels come from the members' files. All but floe_force are filtered (stats/load.py). That load is
+local and lasts as long as a collision; its value depends on impact.conversion, which is named.
 
-A line that parts. The tension of a branch is taken until it parts, all other loads until no branch is left: what comes
-after is no tow, and its zeros would be in every number. Neither tow force nor tension exceeds what the branches bear
-then, and every load ends where it is largest, so where a line parted in any tow there is no tail, and no design value.
-A lower bound in its place was rejected: it stands where a design value stands, and is below the breaking load.
+A line that parts. The tension of a branch counts until it parts, all other loads until no branch is left: after that
+there is no tow, and its zeros would enter every number. Neither tow force nor tension then exceeds the strength of the
+branches, and every load ends at its largest. So if a line parted in any tow there is no tail, and no design value.
+Rejected: a lower bound, which would stand in the place of a design value but be below the breaking load.
 
-Time scale. 30 s, unless it is given: over so long a time the readings of a bollard pull trial are averaged for the
-largest static pull, while the continuous pull, by which a towing vessel is chosen, is a mean of 10 min [IMO 1998,
-MSC/Circ.884, Guidelines for safe ocean towing]. So a tow force of 30 s is one that the vessel must hold by thrust and
-not by its inertia. Shorter loads reach neither: a berg of 80 m on 600 m of line has a period of minutes. At model scale
-Froude's law has it shorter by the root of the length scale (estimate.length_scale), as it has the hours of a tow.
+Time scale. 30 s by default: a bollard pull trial averages its readings over this time for the largest static pull,
+while the continuous pull, used to choose a towing vessel, is a mean of 10 min [IMO 1998, MSC/Circ.884, Guidelines for
+safe ocean towing]. So the vessel must hold a tow force of 30 s by thrust and not by its inertia. Shorter loads reach
+neither vessel nor line: a berg of 80 m on 600 m of line has a period of minutes. At model scale the time scale is
+shorter by the root of the length scale (estimate.length_scale), by Froude's law; so are the hours of a tow.
 """
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ PROBABILITY = 0.05
 ALWAYS = ("tow_force", "ice_resistance")
 ROLE = "load"
 LOCAL = ("floe_force", "panel_load")  # on a part of the hull
-LINE = ("line", "bridle")             # what the tension of a branch needs
+LINE = ("line", "bridle")             # the tension of a branch needs one of these
 TENSION = "line_tension_"             # and the number of the branch
 PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
 TAILS = ("over_threshold", "block_maxima")
@@ -45,24 +45,24 @@ TAILS = ("over_threshold", "block_maxima")
 
 @dataclass(frozen=True)
 class Load:
-    """What a load is, as the files tell it."""
+    """A load, as described in the files."""
 
     name: str
     label: str
     units: str
     description: str
-    needs: str = ""       #: what a run must have for it, as the registry names it
+    needs: str = ""       #: part of a tow that it needs, by its name in the registry
     refused: str = ""     #: why there are no statistics of it
-    conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
+    conversion: str = ""  #: meaning of the peaks of collisions in it; "" if it does not depend on a conversion
 
 
 def filler(run):
-    """What makes a load of a series: of a run with steps without a solution `least`; NaN of another kind stays."""
+    """The function from a series to a load: `least` if the run has steps without a solution; other NaN stay."""
     return least if run.number("no_load_steps") > 0 else np.asarray
 
 
 def _floe_force(run):
-    """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
+    """(Load, values) of the largest force of one floe, None where collisions are not recorded separately."""
     if not {"largest_quasi_static_load", "impact_peak"} <= set(run.series_names):
         return None
     push, peak = run["largest_quasi_static_load"], run["impact_peak"]
@@ -96,7 +96,7 @@ def of_run(run):
 
 
 def of_member(e, m):
-    """The same of a member of an ensemble; of one without its folder, what ensemble.h5 holds."""
+    """The same of a member of an ensemble; if its folder is missing, the loads in ensemble.h5."""
     try:
         with Run(e.folder(m)) as run:
             return of_run(run)
@@ -111,8 +111,8 @@ def scaling(e, rows):
 
 
 def until(e, m, name):
-    """Time up to which a load of a member is that of a tow, s: a tension until its branch parts, any other load until
-    no branch is left."""
+    """Time until a load of a member is no longer that of a tow, s: a tension until its branch parts, any other load
+    until no branch is left."""
     return min((v["time_s"] for v in e.events(m) if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
                default=e.adrift(m))
 
@@ -155,8 +155,8 @@ def gather(e, rows, options):
     """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of
     makes them, the largest start-up of all its tows, also of those whose line parts in it, and the loads that are left
     out: those that are refused, that are constant over all fields together, and whose collisions the members convert in
-    different ways. A field in which a load is constant is a field like any other: ice that the
-    tow does not meet is a load of zero, and its hours count. options: time_scale (None: the default)."""
+    different ways. A field with a constant load is a field like any other: ice that the tow does not meet gives a load
+    of zero, and its hours count. options: time_scale (None: the default)."""
     out, starts, why = {}, {}, {}
     time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
     for m in e.tows(rows, excluded=False):

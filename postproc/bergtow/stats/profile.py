@@ -40,7 +40,7 @@ def gradient(f, theta, step=1e-4):
 def dispersion(minus_log_likelihoods, quantity, theta):
     """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
     theta = np.asarray(theta, dtype=float)
-    # at the edge of what is possible there is no gradient: not finite, and found out below
+    # at the limit of the admissible parameters the gradient is not finite; this is detected below
     with np.errstate(invalid="ignore"):
         scores = gradient(minus_log_likelihoods, theta)
         information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which parameter matters: rank correlations and Sobol indices, from the sample that is there.
+"""Which parameter matters: rank correlations and Sobol indices, from the sample of the study.
 
 Spearman's rho of a parameter with the response, and the partial one (PRCC), after the ranks of the other parameters
 have been regressed out of both; intervals by Fisher's z with the variance 1.06/(n - k - 3) of ranks [Fieller, Hartley &
@@ -12,15 +12,15 @@ sample's own distribution of it: Legendre-like polynomials where it has many val
 values where it has few (then a full factorial design gives the analysis of variance), names included. Then with y = sum
 c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms in i. The estimate c²
 is high by the variance of c, which is taken off. The degree is the one with the best Q² (cross-validated R², each value
-left out in turn). What the expansion does not explain, the scatter of the fields too, is reported as 1 - R²; indices
-share out what it does explain.
+left out in turn). The part that the expansion does not explain, including the scatter of the fields, is reported as 1 -
+R²; the indices divide the part that it explains.
 """
 import itertools
 
 import numpy as np
 import scipy
 
-FEW = 6              # different values up to which a parameter is a choice among levels
+FEW = 6              # a parameter with at most so many different values is a choice among levels
 MOST_DEGREE = 10
 LEAST_SAMPLES = 20
 PER_TERM = 2         # samples a term of the expansion

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""How much of the scatter of a number is of the fields, how much of the parameters, and how much of each of them.
+"""How much of the scatter of a number comes from the fields, from the parameters, and from each of them.
 
-Members of a Latin hypercube, r fields of their own in each of n conditions:
+Members of a Latin hypercube, r separate fields in each of n conditions:
 
     y = m + p(condition) + f(field),    E MS_within = s_f²,    E MS_between = s_f² + r s_p²
 
 the one-way analysis of variance with random effects; with unequal numbers of fields r is Cochran's mean. Intervals
 are those of the jackknife over conditions, of variances on the logarithm; a hypercube is stratified, so they are
-rather too wide. The parameters' part is shared out by Sobol indices of the means of the conditions
-(stats/sensitivity.py), on the scale, plain or logarithmic, on which the expansion predicts better. Rejected: shares
-from correlations alone, which miss what acts in pairs; a surrogate of all members, whose cross-validation would see
-the same condition twice.
+rather too wide. Sobol indices of the means of the conditions (stats/sensitivity.py) divide the parameters' part, on the
+scale, plain or logarithmic, where the expansion predicts better. Rejected: shares from correlations alone, which miss
+effects of pairs; a surrogate of all members, whose cross-validation would see the same condition twice.
 """
 from dataclasses import dataclass
 
@@ -85,7 +84,7 @@ def _of_a_chain(chain):
 
 
 def relative_numerics(rows, own):
-    """What the computation adds, relative to the mean, from the rows of converge.json and the values that the study
+    """The numerical error, relative to the mean, from the rows of converge.json and the values that the study
     runs with, {quantity: value}: {"sd", NaN where nothing is known; "biases": {quantity: relative effect}; "unknown":
     {quantity: why sd does not bound it}}; None without rows."""
     squares, biases, unknown = [], {}, {}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Many runs: ensembles, and what is found out by runs that are made for it."""
+"""Many runs: ensembles, and studies that make their runs."""

@@ -3,7 +3,7 @@
 NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
 
 The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
-`found` as it comes back from the file, where what is not finite is None.
+`found` as read from the file, with None for numbers that are not finite.
 """
 import os
 
@@ -24,7 +24,7 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
 def add_options(p, minutes):
     """--budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",
-                   help=f"wall time, min (default {minutes:g}); the same call goes on")
+                   help=f"wall time, min (default {minutes:g}); the same call continues")
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=arguments.at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")
@@ -44,7 +44,7 @@ def begin(name, file, kind, folder, force):
 
 
 def keep(name, found, folder, force):
-    """Write what was found and say it. Errors: RunError."""
+    """Write a result and print it. Errors: RunError."""
     words, found = KINDS[name][1], writing.plain(found)
     data, *pictures = _files(name, folder)
     writing.write_json(found, data, force)
@@ -59,7 +59,7 @@ def keep(name, found, folder, force):
 
 
 def also(folders):
-    """Folders named by --also hold what they are named for. Errors: RunError."""
+    """Check that the folders named by --also hold results. Errors: RunError."""
     for folder in folders:
         if not any((folder / f"{name}.json").is_file() for name in KINDS):
             raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
@@ -67,8 +67,8 @@ def also(folders):
 
 
 def chapter(name, found):
-    """{"heading", "markdown", "figure"} of what a command found, for a report; figure is a function without arguments,
-    or None. found["doubt"]: why it is not of what the report is of."""
+    """{"heading", "markdown", "figure"} of the result of a command, for a report; figure is a function without
+    arguments, or None. found["doubt"]: why the result does not belong to the subject of the report."""
     heading, words = KINDS[name]
     draw = getattr(words, "figure", None)
     warned = f"WARNING: {found['doubt'][0].upper()}{found['doubt'][1:]}.\n\n" if found.get("doubt") else ""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The band of a tow force over the ranges of what a case assumes: one value at a time, on common fields.
+"""The band of a tow force over the ranges of assumed values: one value at a time, on common fields.
 
-The tow force is F = W + w, with W the part that follows from the drag law alone (water, wind) and w what the ice makes
-of it: its mean R and what the design value has above the mean. An end of a range changes W by its closed form, and R by
-runs in the same fields as those of the case as it is. The design value is taken to change with them:
+The tow force is F = W + w, with W the part that follows from the drag law alone (water, wind) and w the part of the
+ice: its mean R and the excess of the design value over the mean. An end of a range changes W by its closed form, and R
+by runs in the same fields as those of the unchanged case. The design value is assumed to change with them:
 
     F' = W' + w R'/R                                                                                      (assumed)
 
@@ -42,7 +42,7 @@ class Range:
     distribution: str = ""   #: "" where none is stated
 
 
-#: of the keys that no client can measure beforehand; what is the client's question (ice, berg, speed) is not among them
+#: of the keys that no client can measure beforehand; the subject of the question (ice, berg, speed) is not among them
 RANGES = (
     Range("body.drag.water_form", "0.25", "1.25", DRAG),
     Range("body.drag.air_form", "0.4", "1.25", AIR),

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Where along a value do fewer than a given share of random trials succeed? A search that makes no more trials than it
-needs.
+"""Search along a value for the place where the share of random trials that succeed falls below a given share q, with as
+few trials as possible.
 
-At one value the trials are independent, and the question is on which side of the share q the probability p of success
-lies. The likelihood ratio of any p against q, and so that of a mixture of them, is a fair bet while p <= q: it
-exceeds 1/a, ever, with a probability of at most a [Ville 1939; Robbins 1970, Ann. Math. Stat. 41, 1397]. So one may
-look after each trial, and stop when a side is sure at 1 - LEVEL. The mixture is p = 1, and p of density (1 - p)^-1/2
-in (q, 1]: at q = 1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q
-picks a side by chance; an interval for a fixed number of trials, which looking again and again does not leave valid.
+At one value the trials are independent, and the question is whether the probability p of success is above or below q.
+The likelihood ratio of any p against q, and so that of a mixture of them, is a fair bet while p <= q: the probability
+that it ever exceeds 1/a is at most a [Ville 1939; Robbins 1970, Ann. Math. Stat. 41, 1397]. So one may test after each
+trial, and stop when a side is sure at 1 - LEVEL. The mixture is p = 1, and p of density (1 - p)^-1/2 in (q, 1]: at q =
+1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q picks a side by chance;
+an interval for a fixed number of trials, which is not valid after repeated tests.
 
-A trial without an outcome, a run that failed, may have failed for what makes a tow fail. So a side is sure only where
-it is whatever these would have been.
+A trial has no outcome if its run failed, and the cause may be the same that makes a tow fail. So a side is sure only if
+it would be sure with any outcomes of these trials.
 
-Along the value success is taken to be monotonic. Between a value that succeeds and one that fails the middle is tried
-next; one that stays undecided has p near q, and the gaps to both sides of it are narrowed.
+Success is assumed to be monotonic along the value. Between a value that succeeds and a value that fails the middle is
+tried next; a value that stays undecided has p near q, and the gaps on both sides of it are narrowed.
 """
 from dataclasses import dataclass, field
 
@@ -61,11 +61,11 @@ class Point:
 
 @dataclass
 class Bracket:
-    """The search between two ends, of which neither need be the lower."""
+    """The search between two ends, in either order."""
 
     start: float
     end: float
-    resolution: float            #: width at which the search ends
+    resolution: float            #: width of the bracket that ends the search
     share: float = 0.5
     most: int = 24               #: trials of a value
     points: dict = field(default_factory=dict)  #: by value
@@ -100,8 +100,8 @@ class Bracket:
             not p.failed or self.decidable(p, p.failed))
 
     def ends(self):
-        """(the value of a success, that of a failure) next to each other; where there are none of one kind, None and
-        that of the other next to an undecided end."""
+        """(value of a success, value of a failure) next to each other; if there are none of one kind, None for it, and
+        for the other kind the value next to an undecided end."""
         yes = [v for v in self.points if self.judged(v) == YES]
         no = [v for v in self.points if self.judged(v) == NO]
         if not yes or not no:
@@ -111,7 +111,7 @@ class Bracket:
         return min(((a, b) for a in yes for b in no), key=lambda pair: abs(pair[0] - pair[1]))
 
     def expected(self, value):
-        """What the ends say of a value if success is monotonic: YES or NO, OPEN between them."""
+        """The judgement of a value by the ends, if success is monotonic: YES or NO, OPEN between them."""
         yes, no = self.ends()
         if yes is None and no is None:
             return OPEN
@@ -124,7 +124,7 @@ class Bracket:
         return side if all((value - near) * (v - near) <= 0 for v in open_ends) else OPEN
 
     def against(self):
-        """Points whose trials speak against what the ends say of them."""
+        """Points whose trials contradict expected()."""
         def other(p):
             side = self.expected(p.value)
             return p.good < self.share * p.n if side == YES else side == NO and p.good > self.share * p.n

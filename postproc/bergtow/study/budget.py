@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The uncertainty budget of a study whose parameters are drawn from their distributions: mean, scatter of the fields,
-of the parameters, of each of them, of the computation.
+"""The uncertainty budget of a study whose parameters are drawn from their distributions: mean, and scatter from the
+fields, from the parameters, from each of them, and from the computation.
 
     bergtow budget STUDY.yml -o DIR --budget 15        runs the members that are left, then DIR/budget.json, budget.png
 
-The study is a Latin hypercube (`sampling`, `samples`) with fields of its own for each condition, two or more of them
-(`repeats`) to tell fields from parameters. What the computation adds is not varied here: it is that of `bergtow
-converge` on the base case (`--converge FILE`, or converge.json in DIR), from the value on that the study runs with.
+The study is a Latin hypercube (`sampling`, `samples`) with separate fields for each condition, two or more of them
+(`repeats`) to separate fields from parameters. Numerical choices are not varied here: their error is that of `bergtow
+converge` on the base case (`--converge FILE`, or converge.json in DIR), counted from the value of the study.
 """
 import re
 from collections import Counter
@@ -74,7 +74,7 @@ def numbers(e, of):
             raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
                            "name another with --of, or run longer")
     elif of in e.summary:
-        whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # what comes after a tow is in it
+        whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # it includes the time after a tow
         meaning, values = e.meaning.get(of, {}), (e.mean if of == OF[0] else whole)[e.used]
     else:
         raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE",
@@ -96,8 +96,8 @@ def those_there(e):
 
 
 def numerics(e, converge, texts):
-    """What the computation adds to means of an ensemble, as stat_budget.budget takes it; None where nothing is known.
-    Refused where converge.json is of another case."""
+    """The numerical error of means of an ensemble, in the form that stats/variance.py takes; None if nothing is known.
+    Refused if converge.json belongs to another case."""
     if converge is None:
         return None
     if why := compared.misfit(converge, texts):
@@ -125,10 +125,9 @@ def without_intervals(found):
 
 
 def of_ensemble(e, of=OF[0], computed=None):
-    """The budget of a number of an ensemble; what the computation adds, numerics(), is known of the mean ice resistance
-    alone: in per cent of it, which says nothing of a number with drag or inertia in it. Where
-    members of the sample failed, or have no such number, nobody knows which values are missing, and there are no
-    intervals. Errors: RunError."""
+    """The budget of a number of an ensemble. The numerical error, numerics(), is known for the mean ice resistance
+    alone: in per cent of it, which does not apply to a number that includes drag or inertia. If members of the sample
+    failed, or have no such number, the missing values are unknown, and there are no intervals. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
                        CASE)

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Towing capability: the speed that a tow reaches, and the value of a key - concentration, thickness, bollard pull - at
-which half of the tows no longer make it.
+which half of the tows no longer succeed.
 
     bergtow capability CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
     bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   the vessel that is enough
 
-A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) along the ordered tow, in
-the mean over the window and over its last quarter, and no branch of its line parts. The last quarter, because a tow
-that has come to rest in the ice has a mean that only tells for how long it has been there: without it the limit is one
-of run.duration. Of the window the time counts in which tow.programme orders that speed: no tow keeps it through a stop
-that is ordered. Rejected: windows in which the body stood still (stalled_windows), since a tow that stops and goes on
-makes it; they are counted beside. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
-line that may part; a prescribed speed is kept whatever it takes. The search is that of study/bracket.py; what it has
-tried is a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows. Where
-periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
+A tow in one field succeeds when it keeps `--speed` (by default a tenth of tow.speed) along the ordered tow, in the mean
+over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the mean of
+a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
+run.duration. Only those parts of the window count where tow.programme orders that speed: no tow keeps it through an
+ordered stop. Rejected: windows with a body that stood still (stalled_windows), since a tow that stops and continues
+succeeds; they are counted separately. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
+line that may part; a prescribed speed is kept at any force. The search is that of study/bracket.py; the values that it
+has tried are a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
+Where periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
 """
 import sys
 import time
@@ -36,18 +36,18 @@ BUDGET = 15.0            # min
 FIELDS = 12              # trials of a value, at most
 POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
 PARTS = 16               # the range over the resolution
-STOPPED = 0.1            # of tow.speed: what is slower has stopped
+STOPPED = 0.1            # of tow.speed: a slower tow has stopped
 RANGES = {"ice.concentration": ("0.2", "0.95")}
-LATE = 0.25              # of that time: in which a tow must still keep the speed
-FAILING = 3              # runs that fail at a value before it is given up
+LATE = 0.25              # last part of that time, where a tow must still keep the speed
+FAILING = 3              # failed runs at a value before the search gives it up
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What one run says."""
+    """The result of one run."""
 
     field: int
-    speed: float      #: m/s, mean over the time of the window in which the speed to be kept is ordered; NaN: adrift
+    speed: float      #: m/s, mean over those parts of the window that order the speed to be kept; NaN: adrift
     late: float       #: that over the last quarter of it
     stood: bool       #: it stood still for a while, held by the ice
     parted: bool
@@ -86,7 +86,8 @@ def trial(run, number, least):
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
-    # what nothing tows to the end of the window has no speed and no tow force, but the tension by which its line parted
+    # a body that is adrift before the end of the window has no speed and no tow force, but the tension that parted its
+    # line
     towed = run.adrift >= run.window[1]
     speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
     return Trial(number, speed, late, run.number("stalled_windows") > 0,
@@ -112,7 +113,7 @@ class Condition:
 
 @dataclass
 class Search:
-    """What is searched, and by which runs."""
+    """The key to search, and the runs of the search."""
 
     runs: CaseRuns
     key: str
@@ -125,7 +126,7 @@ class Search:
         return f"{c.name}/{value:.8g}"
 
     def sets(self, c, value):
-        """What is replaced in the case for a value, {key: value}."""
+        """The keys that a value replaces in the case, {key: value}."""
         sets = c.sets | {self.key: f"{value:.12g} {self.unit}".strip()}
         if value not in c.wider:
             r = self.runs
@@ -192,7 +193,7 @@ class Search:
                 return
 
 
-# ---- what was found
+# ---- results
 
 
 def row_of(c, value, least):
@@ -279,7 +280,7 @@ def conditions(a, binary, given, start, end, resolution):
 
 
 def check(case, key):
-    """A case in which a tow may stop. Errors: RunError."""
+    """A case whose tow may stop. Errors: RunError."""
     mode, load = case.get("tow.mode"), case_value(case, "tow.line.breaking_load", 0.0)
     if mode != "thrust" and not (mode == "line" and load > 0):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
@@ -380,7 +381,7 @@ def perform(a):
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
     across = (a.conditions or "").partition("=")[0].strip()
     load = case_value(case, "tow.line.breaking_load", 0.0)
-    # keys whose default follows from what is varied are varied with it
+    # a key whose default follows from a varied key varies with it
     alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
     title = case.get("run.title", "none")
     found = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The files of a case as YAML: its own and those that it is based on. What they mean is for the program to say."""
+"""The files of a case as YAML: its file and the files that it is based on. Only the program interprets them."""
 import os
 
 import yaml
@@ -21,7 +21,7 @@ def contents(path):
 
 
 def files(path):
-    """[(path, contents)] of a case and of what it is based on, its own file first. Errors: RunError."""
+    """[(path, contents)] of a case and of the files that it is based on, the case first. Errors: RunError."""
     found = [(path, contents(path))]
     while isinstance(found[-1][1].get("base"), str):
         path = path.parent / found[-1][1]["base"]
@@ -46,5 +46,5 @@ def section(layers, name):
 
 
 def says(case, section, key):
-    """What a case, {section: its keys}, says of a key; None where it says nothing."""
+    """The value of a key in a case, {section: its keys}; None if it is absent."""
     return case.get(section, {}).get(key)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Does a result depend on what only the computation has: the width and length of the domain, the time step, the
-tolerance, the window, the start, the number of fields?
+"""Does a result depend on numerical choices: the width and length of the domain, the time step, the tolerance, the
+window, the start, the number of fields?
 
     bergtow converge CASE.yml -o DIR --budget 10        DIR/converge.json, DIR/converge/NAME/fNNN, a verdict a line
 
 One value is changed at a time, and the case is run with it and without it on the same seeds, so that both are
 compared on the same ice. For a width or length the field of the smaller domain is that of the larger one, cut to it
-(ice.extent): they share all floes but those of a strip. What that is worth stands in the table: the error of the
-effect / that which fields of their own would leave, from the scatter of either. The effect is that on a mean over
-fields, relative to it; its interval is the jackknife over pairs (stats/load.py). Two need no other run: the
-second half of the window against all of it, and the largest tow force of the start-up against the largest of the
-window, which it should not exceed; where it does, the ramp is made longer. Fields are added, in LOOKS looks, until
+(ice.extent): they share all floes but those of a strip. The table shows the gain: the error of the effect / the error
+with separate fields, from the scatter of either. The effect is the relative change of a mean over fields; its interval
+is the jackknife over pairs (stats/load.py). Two checks need no other run: the second half of the window against all of
+it, and the largest tow force of the start-up against the largest of the window, which it should not exceed; where it
+does, the ramp is made longer. Fields are added, in LOOKS looks, until
 
     the interval lies within +- margin             resolved: no effect that matters
     it lies outside of it altogether               resolved: it matters, and the next value is compared with this one
@@ -21,7 +21,7 @@ look is made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejec
 too small where floes jam and too large where nothing happens; a last look at 64, which left a paired effect of 6 % with
 an error of 2 % open while most of the budget was still there.
 
-A tow that starts at its full speed (tow.ramp of 0) is held against one that takes the time of the body's own size.
+A tow that starts at its full speed (tow.ramp of 0) is compared with a ramp during which the body moves by its size.
 """
 import argparse
 import time
@@ -45,15 +45,15 @@ FIELDS = (4, 8, 16, 32, 64, 128, 256)  # of each look
 LOOKS = len(FIELDS)
 TRIES = 3                   # values of a quantity after each other, at most
 MARGIN = 0.1
-UNSOLVED = 0.01             # share of steps short of the tolerance above which runs do not tell of it
+UNSOLVED = 0.01             # share of unconverged steps above which a comparison is not judged
 BUDGET = 10.0               # min
 WINDOW_TOO_EARLY = "no longer ramp ends before the window: tow for longer, with a later window"
-EFFORT = 0.05               # relative error of the mean that the number of fields is for
+EFFORT = 0.05               # relative error of the mean that the number of fields has to reach
 RAMP = 4.0                  # the ramp is made so many times as long
 LATEST = 0.8                # of the beginning of the window: where a ramp ends at the latest
 
 
-# ---- what is varied
+# ---- quantities that are varied
 
 
 def times(key, factor):
@@ -62,7 +62,7 @@ def times(key, factor):
 
 
 def slower_start(run, k):
-    """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size. It
+    """RAMP times as long each time; without a ramp, first the time that the body takes to move by its size. It
     ends well before the window."""
     first = run.value("tow.ramp")
     own = np.ptp(run.bodies[run.towed].vertices, axis=0).max() / run.value("tow.speed")
@@ -104,7 +104,7 @@ def wider(run, k):
 
 
 def cut_from(run, larger):
-    """Keys with which the field of a domain is cut from that of a larger one, of these values: the ice region's ends
+    """Keys that cut the field of a domain from that of a larger domain, of these values: the ice region's ends
     that move. {} where the ice is not made.
 
     The smaller domain is run once more for it: its own field is another, and so would be that cut from a still larger
@@ -126,15 +126,15 @@ def cut_from(run, larger):
 
 
 def mean_resistance(run):
-    """NaN where the tow ends within the window, since what comes after is no resistance to a tow, and where steps of it
-    have no solution: two lower bounds cannot be compared."""
+    """Mean ice resistance, N. NaN where the tow ends within the window, since the rest of the window is no tow, and
+    where steps of it have no solution: two lower bounds cannot be compared."""
     towed = run.window and run.adrift >= run.window[1] and not run.at_least
     return run.number("mean_ice_resistance_n") if towed else np.nan
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A quantity that is varied: the key that stands for it, values of try k, and what they are compared by."""
+    """A quantity that is varied: its key, its values of try k, and the measure by which runs are compared."""
 
     name: str
     key: str
@@ -142,8 +142,8 @@ class Kind:
     measure: object
     what: str
     same_ice: bool
-    finer: str            #: what the next value is
-    own: object = None    #: what the measure of the same runs is held against, in place of that of the next value
+    finer: str            #: comparative for the next value, such as "wider"
+    own: object = None    #: measure of the same runs to compare with, in place of runs with the next value
 
 
 KINDS = (
@@ -175,7 +175,7 @@ def effect(base, other, looks=LOOKS):
 
 
 def pairing(base, other):
-    """Error of the effect / that which two independent samples of this scatter would leave; None where it is none."""
+    """Error of the effect / its error from two independent samples of this scatter; None where that is 0 or NaN."""
     a, b = base / base.mean(), other / other.mean()
     alone = np.var(a, ddof=1) + np.var(b, ddof=1)
     return float(np.sqrt(np.var(b - a, ddof=1) / alone)) if np.isfinite(alone) and alone > 0 else None
@@ -192,7 +192,7 @@ def judged(interval, margin, one_sided=False):
 
 
 def unsolved(study, name, n):
-    """Share of the steps of n runs that did not reach the tolerance: what they make does not hang on it."""
+    """Share of the steps of n runs that did not reach the tolerance: their results do not depend on it."""
     missed, steps = (study.measured(name, range(n), lambda run, key=key: run.number(key)).sum()
                      for key in ("unconverged_steps", "n_steps"))
     return missed / steps if steps > 0 else 0.0
@@ -212,7 +212,7 @@ def compare(study, kind, base_name, base_values, name, values, margin):
         if (missed := max(unsolved(study, m, n) for m in {base_name, base_name if kind.own else name})) > UNSOLVED:
             return row | {"fields": n, "why": f"{100 * missed:.2g} % of the steps ended at solver.max_sweeps, short of "
                           "the tolerance; raise it"}
-        if base.mean() == 0 or base.max() == base.sum():  # nothing to hold it against, without one field at least
+        if base.mean() == 0 or base.max() == base.sum():  # no mean to compare with, or none without one of the fields
             return row | {"fields": n, "why": f"nothing to hold the {kind.what} against",
                           "judged": "matters" if kind.own and other.min() > 0 else "open"}
         row["effect"], row["interval_95"] = effect(base, other)
@@ -307,7 +307,7 @@ def fields_row(study):
 
 
 def verdicts(study):
-    """{verdict on the window: how many of the tows of the case as it is}."""
+    """{verdict on the window: number of tows of the unchanged case}."""
     found = Counter()
     for i in (i for i in range(FIELDS[-1]) if study.kept("case", i, {})):
         with Run(study.path("case", i)) as run:
@@ -316,8 +316,8 @@ def verdicts(study):
 
 
 def varied(study, kinds, margin, tries, end):
-    """{name: rows}. What is left of the budget goes in equal parts to what is still open, until all is resolved or
-    nothing can be run any more."""
+    """{name: rows}. The remaining budget is divided equally among the open quantities, until all are resolved or no
+    further run is possible."""
     found, waiting, before = {}, kinds, -1
     while waiting and study.made > before:
         before = study.made
@@ -336,7 +336,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
-                       "raise --budget; what was begun is kept, and the same call goes on", SIGNAL)
+                       "raise --budget; runs are kept, and the same call continues them", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         try:

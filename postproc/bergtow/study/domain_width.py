@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The width that a domain of periodic sides needs for its ice, by the rule of `bergtow check`: a load that rests on the
-periodic images of the body is none to design for. Walls are part of the question, and stay where they are; so does the
-length of a domain in which the tow goes along y, which has a warning."""
+"""The width that a domain of periodic sides needs for its ice, by the rule of `bergtow check`: a load that the periodic
+images of the body carry must not enter a design. Walls are part of the case, and stay in place; so does the length of a
+domain where the tow runs along y, which gets a warning."""
 import json
 import math
 

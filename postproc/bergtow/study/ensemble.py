@@ -28,7 +28,7 @@ STATUS = {1: "finished", 2: "failed", 0: "waiting"}
 class Ensemble:
     """The folder of an ensemble.
 
-        ensemble = bergtow.Ensemble.run("study.yml", "out/study")     # the same call goes on where one was stopped
+        ensemble = bergtow.Ensemble.run("study.yml", "out/study")     # the same call continues a stopped study
         ensemble.dataframe.groupby("tow.speed")["mean_ice_resistance_n"].agg(["mean", "sem", "count"])
         ensemble.dataset.ice_resistance.sel(member=0)                 # the series of a member, N
 
@@ -54,8 +54,8 @@ class Ensemble:
 
         client: a dask.distributed.Client whose workers see the same folders and the same program; without one it is one
         process for all cores here. tasks: how many calls of the program share the members, of `threads` (1) each;
-        default as many as the workers have threads for. A worker that dies costs what its members computed since their
-        last checkpoint: another task goes on with them, or the last call, which is made here.
+        default as many as the workers have threads for. If a worker dies, its members lose the steps since their last
+        checkpoint: another task continues them, or the last call, which is made here.
         """
         command = [program_path(), "ensemble", os.path.abspath(study), "-o", os.path.abspath(out)]
         for key, value in (overrides or {}).items():
@@ -96,8 +96,8 @@ class Ensemble:
         """An xarray.Dataset, read when it is used: close it as any.
 
         Dimensions: member, and sample (entries of the series). Coordinates: name, condition, repeat, seed of each
-        member, and what the study varies. Variables: the numbers of summary.json, the series, state_hash, status and
-        reason. All have units and a long_name.
+        member, and the keys that the study varies. Variables: the numbers of summary.json, the series, state_hash,
+        status and reason. All have units and a long_name.
         """
         xarray, file = _imported("xarray"), self._open()
         from bergtow.result.hdf5 import plain

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Vessel and line of a tow: what a client names, what the tow force asks for, and up to which speed the vessel holds
-it.
+"""Vessel and line of a tow: the client's choice, the needs of the tow force, and the largest speed where the vessel
+holds it.
 
 A vessel is a class of the library (bergtow/towing) or a bollard pull, "110 t" or "1.1 MN"; a line is one of the library
 or a breaking load. What neither the call nor the case says is assumed, and named so: the free-running speed. The
@@ -98,14 +98,15 @@ def line(text, case, library=None, own_length=None):
 
 
 def needed_pull(v, load, speed, efficiency, own=0.0):
-    """Bollard pull, N, for a tow force at a speed; inf from the free-running speed on. What is not finite stays."""
+    """Bollard pull, N, for a tow force at a speed; inf from the free-running speed on. A load that is not finite is
+    returned unchanged."""
     if not np.isfinite(load):
         return load
     return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
 
 
 def pull_at(v, speed, efficiency, own=0.0):
-    """What the vessel pulls with at a speed, N; NaN without a vessel."""
+    """The pull of the vessel at a speed, N; NaN without a vessel."""
     left = efficiency * v.pull * towing.pull_share(speed, v.free_speed) - own
     return left if not left < 0 else 0.0
 
@@ -122,7 +123,7 @@ def verdict(load, interval, has):
 
 
 def own_resistance(v, thickness, concentration, speed):
-    """(low, high, source) of what the ice takes of the vessel itself, N, an order of magnitude; None without a beam."""
+    """(low, high, source) of the ice resistance of the vessel itself, N, an order of magnitude; None without a beam."""
     if not (np.isfinite(v.beam) and thickness > 0):
         return None
     found = towing.ice_resistance(v.beam, thickness, concentration, speed)
@@ -130,8 +131,8 @@ def own_resistance(v, thickness, concentration, speed):
 
 
 def limit_speed(speeds, needs, has):
-    """m/s at which the need first exceeds what the vessel has, linear between speeds; None where it never does, or does
-    from the first on."""
+    """Speed, m/s, where the need first exceeds the vessel's pull, linear between speeds; None if it never does, or does
+    so at the first speed."""
     gap = np.asarray(has) - np.asarray(needs)
     if gap[0] < 0:
         return None

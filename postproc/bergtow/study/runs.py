@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Runs of one case with some keys replaced, made when they are asked for, as many as it takes, and kept in folders.
-What bergtow converge and bergtow capability decide from.
+"""Runs of one case with some keys replaced, made on demand and kept in folders. bergtow converge and bergtow capability
+base their decisions on them.
 
-    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by;
+    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: its inputs;
                                 begun.json in place of it while the run is under way or stopped; finished: the record
                                 of its files, as that of an ensemble's member (result/integrity.py)
 
-A run is kept, and one that was stopped goes on, while the case file, the files that it names, the program and the
-values are what they were. One whose files do not fit the record is reported and made anew. One call at a time works in
+A run is kept, and a stopped run continues, as long as the case file, the files that it names, the program and the
+values are unchanged. A run whose files do not fit the record is reported and made anew. One call at a time works in
 DIR/SUBJECT: it and its runs hold the lock of the folder.
 """
 import ctypes
@@ -34,7 +34,7 @@ from bergtow.study.case_file import files
 import numpy as np
 
 DONE, STOPPED, SPENT = 0, 6, "the budget is spent"  # exit codes of the program; a run that met its limit
-FRESH = 2, 3, 4  # exit codes of a resume that cannot go on with what there is
+FRESH = 2, 3, 4  # exit codes of a resume that cannot use the files of the run
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 
@@ -97,7 +97,7 @@ class CaseRuns:
     program: Path
     given: list            #: --set of the user's
     jobs: int
-    end: float             #: of what is left to a quantity, by time.monotonic()
+    end: float             #: of the time for a quantity, by time.monotonic()
     last: float            #: of the budget
     seconds: dict = field(default_factory=dict)  #: of a run, by setting
     made: int = 0          #: runs that were made, and not there before
@@ -115,7 +115,7 @@ class CaseRuns:
         try:
             layers = files(self.case)
         except RunError:
-            layers = [(self.case, {})]  # the program says what is wrong with it
+            layers = [(self.case, {})]  # the program will report what is wrong with it
         read = [(path.parent, text) for path, some in layers for text in texts_of(some)]
         read += [(self.case.parent, text.partition("=")[2].strip()) for text in self.given]
         parts = [path for path, _ in layers] + [folder / text for folder, text in read if is_file(folder, text)]
@@ -130,7 +130,7 @@ class CaseRuns:
         return [*self.given, "output.frame_interval=-1 s", *texts, f"ice.seed={1000 + i}"]
 
     def stamp(self, i, values):
-        """What a run is made by, wherever it lies."""
+        """The inputs of a run, without its place."""
         named = [digest(self.case.parent / text).hex() for text in values.values()
                  if isinstance(text, str) and is_file(self.case.parent, text)]
         return [self.identity, *named, *self.sets(i, values)]
@@ -142,11 +142,11 @@ class CaseRuns:
             return False
 
     def record(self, name, i, values):
-        """(name, what it was made by) of a run, as its record has them."""
+        """(name, inputs) of a run, in the form of its record."""
         return f"{self.subject}/{name}/{self.path(name, i).name}", json.dumps(self.stamp(i, values)).encode()
 
     def kept(self, name, i, values):
-        """Is a run there that was made by this, and is as the program left it? Of one that is not it is said why."""
+        """Does a run with these inputs exist, with its files unchanged? A warning says why a run is damaged."""
         path = self.path(name, i)
         if not self.stamped(name, i, values, "call.json"):
             return False
@@ -176,7 +176,7 @@ class CaseRuns:
         return code, said, stopped_by_limit(code, time.monotonic() - began, left)
 
     def go_on(self, name, i, values):
-        """The same of one that an earlier call has begun; None where there is none to go on with."""
+        """Continue a run that an earlier call began; as call(), None where there is none to continue."""
         path = self.path(name, i)
         if not (self.stamped(name, i, values, "begun.json") and (path / "checkpoint.h5").exists()):
             return None
@@ -237,7 +237,7 @@ class CaseRuns:
         for path, (why, code) in sorted(self.failed.items())[:1]:
             more = f", and {len(self.failed) - 1} more" if len(self.failed) > 1 else ""
             raise RunError(path, f"this run failed{more}: {why}",
-                           "what was found is without it; mend what made it fail", code)
+                           "the result is without it; remove the cause of the failure", code)
 
     def refuse_copies(self, name, fields):
         """Errors: RunError where two of these fields are the same run, whose scatter is none and decides nothing.

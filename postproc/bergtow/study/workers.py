@@ -2,9 +2,9 @@
 """Members of an ensemble on the workers of Dask.
 
 Each task is a call of `bergtow ensemble --no-wait` on the one folder; the calls share the members by the locks of the
-program, as the jobs of an array do (cases/studies/slurm-array.sh). Rejected: a task for each member, which would bring
-a second list of members, second rules of what is finished, and a start of the program for each of them; what it would
-give, that Dask moves a member from one worker to another, the locks do as well.
+program, as the jobs of an array do (cases/studies/slurm-array.sh). Rejected: a task for each member, which would need a
+second list of members, a second rule for finished members, and a start of the program for each member. Its advantage,
+that Dask moves members between workers, the locks give as well.
 """
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def _finished(out: Path) -> int:
 
 def on_workers(client: Any, command: list[str], out: str | os.PathLike[str], tasks: int, threads: int,
                progress: bool) -> None:
-    """Run calls of the program on the workers, until nothing is left to begin. What has become of the members the last
-    call of the caller says. Errors: BergtowError when no call could be made at all."""
+    """Run calls of the program on the workers, until no member is left to begin. The last call of the caller reports
+    the state of the members. Errors: BergtowError when no call could be made at all."""
     if not client.nthreads():
         raise BergtowError("the Dask client has no workers; start some, or leave out client", IO)
     count = tasks or max(sum(client.nthreads().values()) // max(threads, 1), 1)

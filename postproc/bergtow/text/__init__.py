@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Tables and sentences of what was found, at the terminal and as Markdown."""
+"""Tables and sentences of results, at the terminal and as Markdown."""

@@ -51,7 +51,7 @@ def rows(found):
 
 
 def _numerics(found):
-    """The line of the scatter that the computation may add, and that of what it is known to add."""
+    """Two lines: the scatter that the computation may add, and its known bias."""
     n, mean = found["numerics"], abs(found["mean"])
     if not n or "refused" in n:
         return [["numerics", "not known" if n else "not studied", *[""] * 5]]
@@ -66,7 +66,7 @@ def _numerics(found):
 
 
 def numerics_notes(found):
-    """Sentences on what is known of the computation, and what is not."""
+    """Sentences on the known and the unknown numerical errors."""
     n = found["numerics"]
     if not n:
         return " Numerics: run `bergtow converge` on the base case and name its file with --converge." \
@@ -99,7 +99,7 @@ def notes(found):
 
 
 def warnings(found):
-    """Lines on what is not in the numbers."""
+    """Lines on members and effects that the numbers leave out."""
     wanted, out = found["wanted"], []
     left = found.get("waiting", wanted - found["members"])
     if left:

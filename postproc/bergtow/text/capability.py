@@ -58,7 +58,7 @@ def curve(found, markdown=False):
 
 
 def meaning(found):
-    """What the words of the tables mean, and what it took."""
+    """The meaning of the words in the tables, and the cost of the study."""
     runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
         p["failed"] for c in found["conditions"] for p in c["points"])
     line = ", and no branch of its line parts" if found["breaking_load"] else ""

@@ -203,9 +203,9 @@ def sensitivity(s, markdown):
         notes.append(
             f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
             f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, "
-            f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
-            f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields "
-            f"and what it misses."
+            f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They "
+            f"divide the part that it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter "
+            f"of the fields and error of the expansion."
         )
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
@@ -234,7 +234,7 @@ def report(s, markdown=False):
         name, why = next(iter(s["unsound"].items()))
         lines.append(
             f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: "
-            f"{name}: {why}. `bergtow ensemble` again runs what is damaged anew."
+            f"{name}: {why}. Call `bergtow ensemble` again to rerun damaged members."
         )
     if s["without_mean"]:
         lines.append(

@@ -45,7 +45,7 @@ def ends(d, factor):
 
 
 def design(s, markdown):
-    """The design statement: a row a condition, what it holds for, and the warnings."""
+    """The design statement: a row a condition, the conditions that it holds for, and the warnings."""
     some = _towed(s)
     if not some:
         return "No design tow force. " + "\n".join(warnings(s))
@@ -73,7 +73,7 @@ def design(s, markdown):
 
 
 def steps(s):
-    """What the tensions of single steps reach, which are in no design tension; "" without a line."""
+    """The largest tensions of single steps, which no design tension includes; "" without a line."""
     found = {}
     for c in sorted(s["conditions"], key=_governs):
         for x in c["design"]["branches"]:
@@ -121,7 +121,7 @@ def _governs(c):
 
 
 def warnings(s):
-    """"WARNING: what is the matter: condition (how much); condition", each matter once."""
+    """"WARNING: problem: condition (amount); condition", each problem once."""
     found, every = {}, len(s["conditions"])
     for c in sorted(s["conditions"], key=_governs):
         for w in c["design"]["warnings"]:
@@ -194,7 +194,7 @@ def nothing(s):
 
 
 def left_out(s):
-    """Sentences on what is in no number: members without a load, and loads without statistics."""
+    """Sentences on members without a load, and on loads without statistics."""
     few, why = {}, {}
     for c in s["conditions"]:
         lacking = {}
@@ -269,7 +269,7 @@ def cut(name, f, hours):
 
 
 def cut_note(some):
-    return [f"Blocks are of one length, what is left over is in no block: {several(some)}."] if some else []
+    return [f"All blocks have one length; the rest is left out: {several(some)}."] if some else []
 
 
 def returns(s, markdown):
