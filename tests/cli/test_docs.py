@@ -7,12 +7,16 @@ import itertools
 import json
 import re
 import shlex
+import sys
 
 import pytest
 
 import harness
 from bergtow import cli
-from harness import DONE, ROOT, call
+from harness import BERGTOW, DONE, ROOT, call
+
+sys.path.insert(0, str(ROOT / "docs"))
+import tables  # noqa: E402
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
@@ -244,15 +248,24 @@ def test_cases_are_valid_with_what_a_call_sets(path):
             assert done.returncode == DONE, f"{line}: {done.stderr}"
 
 
-def test_the_manual_has_every_command_and_option():
-    """Or postproc/README.md has it; but for those that every program has. And the commands of this test are the
-    program's."""
+def test_the_manual_has_every_command():
+    """Or postproc/README.md has it. And the commands of this test are the program's."""
     text = "".join((ROOT / page).read_text() for page in ("docs/manual.md", "postproc/README.md"))
     assert set(re.findall(r"^  ([a-z][a-z-]*) +", call("--help").stdout, re.M)) == COMMANDS
     assert {words[0] for _, words in calls(text)} >= COMMANDS
-    for command in sorted(COMMANDS):
-        for option in options(command) - {"--usage", "--output"}:
-            assert not option.startswith("--") or option in text, f"{command} {option}"
+
+
+def test_the_reference_describes_every_option(tmp_path):
+    """In the table of its command, made from --help; but for those that every command has."""
+    tables.commands(BERGTOW, tmp_path)
+    text = (tmp_path / "commands.md").read_text()
+    found = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", text, re.S | re.M))
+    assert set(found) == COMMANDS
+    for command, section in found.items():
+        described = {flag for flags in re.findall(r"^\| (`-.*?) \| .*\w.* \|$", section, re.M)
+                     for flag in re.findall(r"`(--?[a-z][a-z-]*)`", flags)}
+        spoken_of = {"--help", "--usage", "--version", "--list-keys", "-h"} - described
+        assert described <= options(command) and options(command) - spoken_of <= described | {"-V"}, command
 
 
 @every_page
