@@ -56,11 +56,11 @@ def text_of(path, open_sections=()):
     return text
 
 
-def asks(text, match):
-    """Whether a "what" is a question, or stands behind a verb of asking or telling."""
+def allowed(text, match):
+    """Whether a form stands in a question, or a "what" behind a verb of asking or telling."""
     before = re.split(r"[.;:|]", text[max(0, match.start() - 40):match.start()])[-1]
-    after = re.match(r"[^.!|]*?\?", text[match.end():])
-    return bool(after or re.search(rf"\b(?:{VERBS})(?:\s+\w+){{0,2}}\s+$", before))
+    asked = match[0].lower().startswith("what") and re.search(rf"\b(?:{VERBS})(?:\s+\w+){{0,2}}\s+$", before)
+    return asked or re.match(r"[^.!|]*\?", text[match.end():])
 
 
 def faults(path, open_sections=()):
@@ -68,7 +68,7 @@ def faults(path, open_sections=()):
     text = text_of(path, open_sections)
     for form, remedy in FORMS:
         for match in re.finditer(rf"\b{form.replace(' ', GAP)}\b", text, re.IGNORECASE):
-            if not form.startswith("what") or not asks(text, match):
+            if not allowed(text, match):
                 yield text.count("\n", 0, match.start()) + 1, " ".join(match[0].split()), remedy
 
 

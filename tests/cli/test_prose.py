@@ -39,7 +39,7 @@ def test_a_form_is_found_over_the_end_of_a_line_and_not_of_a_paragraph(tmp_path,
 @pytest.mark.parametrize("text", [
     "# What is needed",
     "What is a floe?",
-    "| What is assumed, and why? | Assumptions |",
+    "| Which document is this, of which revision? | title block |",
     "`check` says what is wrong; it shows exactly what the case needs.",
     "a run, which stops",
     "There is no floe that moves.",
