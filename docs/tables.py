@@ -3,7 +3,11 @@
 import json
 import re
 import subprocess
+import sys
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "install"))
+import from_help  # noqa: E402
 
 
 def said(program, *arguments):
@@ -93,9 +97,19 @@ def quantities(program, folder):
 
 
 def commands(program, folder):
-    text = said(program, "--help")
-    page = ["# Commands", "", "What `bergtow COMMAND --help` says. `make install` also installs this as a man page "
-            "(`man bergtow`), with completions for bash and zsh.", "", "```text", text.rstrip(), "```", ""]
-    for name in re.findall(r"^  ([a-z]+)  ", text, re.M):
-        page += [f"## {name}", "", "```text", said(program, name, "--help").rstrip(), "```", ""]
+    found, own, codes = from_help.commands(program)
+    page = ["# Commands", "", "Every command with its options, from `bergtow COMMAND --help`. `make install` also "
+            "installs this as a man page (`man bergtow`), with completions for bash and zsh. `--help` is an option of "
+            "each.", "", *head("command", "purpose")]
+    page += [row(f"[{c.name}](#{c.name})", plain(c.summary)) for c in found]
+    page += ["", *head("option of `bergtow` itself", "effect"), *(row(f"`{flag}`", plain(text)) for flag, text in own),
+             "", plain(codes), ""]
+    for command in found:
+        page += [f"## {command.name}", "", f"`bergtow {command.name} [OPTION...] {command.operands}`", "",
+                 plain(command.about), ""]
+        options = [o for o in command.options if not {"--help", "--usage", "--version"} & {*o.flags}]
+        if options:
+            page += head("option", "effect")
+            page += [row(", ".join(f"`{f}`" for f in o.flags) + (f" `{o.arg}`" if o.arg else ""), plain(o.text))
+                     for o in options] + [""]
     write(folder / "commands.md", "\n".join(page))

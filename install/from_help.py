@@ -12,8 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-OPTION = re.compile(r"^ {2,8}(?=-)(?:-(?P<short>[\w?])(?:[ =](?P<short_arg>[^\s,]+))?,? *)?"
-                    r"(?:--(?P<long>[\w-]+)(?:[ =](?P<arg>\S+))?)?(?: {2,}(?P<text>\S.*))?$")
+OPTION = re.compile(r"^ {2,8}(?P<forms>-\S.*?)(?: {2,}(?P<text>\S.*))?$")
 HERE = Path(__file__).resolve().parent
 WORDS = {"DIR": "folder", "FILE": "file", "CASE.yml": "file", "STUDY.yml": "file"}
 
@@ -30,12 +29,9 @@ def said(program, *arguments):
 
 class Option:
     def __init__(self, match):
-        self.short, self.long = match["short"], match["long"]
-        self.arg, self.text = match["arg"] or match["short_arg"], match["text"] or ""
-
-    @property
-    def flags(self):
-        return [f for f in (self.short and f"-{self.short}", self.long and f"--{self.long}") if f]
+        forms = [re.match(r"([\w?-]+)(?:[ =](.+))?", form) for form in re.split(r", +(?=-)", match["forms"])]
+        self.flags = [form[1] for form in forms]
+        self.arg, self.text = forms[-1][2], match["text"] or ""
 
 
 class Command:
@@ -46,11 +42,12 @@ class Command:
         text = said(program, name, "--help")
         usage, _, rest = text.partition("\n" if text.startswith("Usage") else "\n\n")
         usage = re.sub(r"\s+", " ", usage)
-        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|MAP|RUN|A)\b\S*(?: \[B\])?)$", usage)
-        self.operands = self.operands[0] if self.operands else ""
+        operands = re.search(r" ((?:CASE|STUDY|DIR|MAP|RUN|A)\b\S*(?: FILE\.h5| \[B\]| \[RUN \.\.\.\])?)$",
+                             usage.strip())
+        self.operands = operands[1] if operands else ""
         for line in rest.splitlines():
             match = OPTION.match(line)
-            if match and (match["short"] or match["long"]):
+            if match:
                 self.options.append(Option(match))
             elif self.options and line.startswith(" " * 12):
                 self.options[-1].text = f"{self.options[-1].text} {line.strip()}".strip()
@@ -62,7 +59,7 @@ class Command:
 def commands(program):
     """The commands and the program's own options, from `bergtow --help`."""
     text = said(program, "--help")
-    listed = re.findall(r"^  ([a-z-]+) +(\S.*)$", text, re.MULTILINE)
+    listed = re.findall(r"^  ([a-z][a-z-]*) +(\S.*)$", text, re.MULTILINE)
     own = re.findall(r"^  (--[\w-]+) +(\S.*)$", text, re.MULTILINE)
     codes = text[text.index("Exit codes:"):]
     return [Command(program, *c) for c in listed], own, re.sub(r"\s+", " ", codes).strip()
@@ -98,7 +95,7 @@ def man_page(found, own, codes, version):
         out += [f".SS bergtow {c.name} [\\fIOPTION\\fR...] \\fI{roff(c.operands)}\\fR", roff(c.about)]
         out += options_of(c)
     out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT",
-            *terms([("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
+            *terms([("OMP_NUM_THREADS", "threads of a rank unless option or case sets them"),
                     ("BERGTOW_MPI", "yes or no: start MPI, or not"),
                     ("BERGTOW_DIVIDE", "always: all ranks share the field, even where one alone would be faster"),
                     ("BERGTOW_HOME", "folder that holds postproc/, where the Python package is"),

@@ -19,8 +19,8 @@ def lines_of(path):
         return list(enumerate(f.read().split("\n"), 1))
 
 
-def prose(lines):
-    """(number, line) of Markdown without tables and code, whether fenced or indented, and without targets of links."""
+def outside_code(lines):
+    """(number, line) of Markdown without code, whether fenced or indented, and without blank lines."""
     fence, code, after_blank, item = None, False, True, 0
     for number, line in lines:
         mark = FENCE.match(line)
@@ -39,12 +39,19 @@ def prose(lines):
             item = 0
         code = indent >= item + 4 and (code or after_blank)
         after_blank = False
-        if code or line.lstrip().startswith("|"):
+        if code:
             continue
         bullet = ITEM.match(line)
         if bullet:
             item = bullet.end()  # where the text of a list's item begins: its code is indented from there
-        yield number, TARGET.sub("", line)
+        yield number, line
+
+
+def prose(lines):
+    """(number, line) of Markdown without code, tables and targets of links."""
+    for number, line in outside_code(lines):
+        if not line.lstrip().startswith("|"):
+            yield number, TARGET.sub("", line)
 
 
 def main(paths):

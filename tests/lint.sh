@@ -57,6 +57,7 @@ for f in sys.argv[1:]: ast.parse(open(f).read(), f)" $(files '*.py') || complain
     '*.sh' '*.js' '*.css' '*.html' '*.yml' '*.supp' \
     Makefile .ci/run .clang-tidy) ||
     complain "lines of more than 120 characters: see above"
+"$python" tests/prose.py || complain "phrases that make a reader stumble: see above"
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
 # A checker is called where there is a file for it.

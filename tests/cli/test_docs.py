@@ -7,12 +7,16 @@ import itertools
 import json
 import re
 import shlex
+import sys
 
 import pytest
 
 import harness
 from bergtow import cli
-from harness import DONE, ROOT, call
+from harness import BERGTOW, DONE, ROOT, call
+
+sys.path.insert(0, str(ROOT / "docs"))
+import tables  # noqa: E402
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
@@ -99,10 +103,14 @@ def source():
 
 
 @functools.cache
-def options(command):
-    done = call(command, "--help")
+def help_of(*command):
+    done = call(*command, "--help")
     assert done.returncode == DONE, command
-    return set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", done.stdout))
+    return done.stdout
+
+
+def options(command):
+    return set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", help_of(command)))
 
 
 @functools.cache
@@ -199,7 +207,7 @@ def test_functions_are_defined_where_the_page_says(path):
 @every_page
 def test_commands_and_options_are_known(path):
     found = list(calls(path.read_text()))
-    assert len(found) > 40 or path.parent.name != "postproc"
+    assert len(found) > 30 or path.parent.name != "postproc"
     for line, words in found:
         if words[0].startswith("--"):
             assert set(words) <= {"--help", "--version", "--list-keys", "--list-quantities", "--json"}, line
@@ -244,15 +252,27 @@ def test_cases_are_valid_with_what_a_call_sets(path):
             assert done.returncode == DONE, f"{line}: {done.stderr}"
 
 
-def test_the_manual_has_every_command_and_option():
-    """Or postproc/README.md has it; but for those that every program has. And the commands of this test are the
-    program's."""
+def test_the_manual_has_every_command():
+    """Or postproc/README.md has it. And the commands of this test are the program's."""
     text = "".join((ROOT / page).read_text() for page in ("docs/manual.md", "postproc/README.md"))
-    assert set(re.findall(r"^  ([a-z][a-z-]*) +", call("--help").stdout, re.M)) == COMMANDS
+    assert set(re.findall(r"^  ([a-z][a-z-]*) +", help_of(), re.M)) == COMMANDS
     assert {words[0] for _, words in calls(text)} >= COMMANDS
-    for command in sorted(COMMANDS):
-        for option in options(command) - {"--usage", "--output"}:
-            assert not option.startswith("--") or option in text, f"{command} {option}"
+
+
+def test_the_reference_describes_every_option(tmp_path, monkeypatch):
+    """In the table of its command, made from --help; but for those that every command has."""
+    monkeypatch.setattr(tables.from_help, "said", lambda program, *words: help_of(*words[:-1]))
+    tables.commands(BERGTOW, tmp_path)
+    text = (tmp_path / "commands.md").read_text()
+    found = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", text, re.S | re.M))
+    assert set(found) == COMMANDS
+    for command, section in found.items():
+        rows = re.findall(r"^\| (`-.*?) \| .*\w.* \|$", section, re.M)
+        described = set(re.findall(r"`(--?[a-z][a-z-]*)`", " ".join(rows)))
+        for option in options(command) - {"--help", "--usage", "--version"} - described:
+            begins_a_line = re.search(rf"^ {{2,8}}(?:-.*, )?{option}(?![\w-])", help_of(command), re.M)
+            assert option.startswith("-h") or not begins_a_line, f"{command} {option}"
+        assert described <= options(command)
 
 
 @every_page

@@ -174,7 +174,7 @@ def test_the_return_time_of_a_design_value():
                                                 (EAR1(0.0), 8, 600), (POISSON(0.02), 8, 4000)],
                          ids=lambda v: getattr(v, "name", None))
 def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
-    """95 % of them do (tests/long and postproc/README.md have the numbers); of so few, no fewer than chance explains
+    """95 % of them do (tests/long and docs/statistics.md have the numbers); of so few, no fewer than chance explains
     for the 90 % that are asked for, and their middle is where the level is."""
     found = coverage(process, fields, n, TRIALS, (1.0, 10.0), seed=21)
     least = stats.binom.ppf(2e-3, TRIALS, 0.9)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Do 95 % intervals of return levels hold the levels of signals whose extremes are known? The tables of
-postproc/README.md (make test-long; half an hour on one core)."""
+docs/statistics.md (make test-long; half an hour on one core)."""
 import numpy as np
 import pytest
 
