@@ -137,6 +137,23 @@ def test_a_maze_is_crossed_by_its_openings():
     assert other / 1.09 <= r.length <= 1.005 * other
 
 
+def test_what_keeps_out_elsewhere_changes_no_plan():
+    """A box in a corner, of no consequence but that steps round what is kept out of are counted: the same routes, and
+    no more states. Red: a bound that is not below the cost, or that falls along a move by more than the move costs."""
+    for seed, radius in (5, 0), (6, 25):
+        outlines, thickness = floes(200, 600, 400, seed)
+        options = {"extent": (0, 0, 600, 400), "radius": radius, "routes": 3, "weights": PLOUGH}
+        free, beside = (plan(Ice(outlines, thickness), BERG, (40, 60), (560, 340), no_go=no_go, **options)
+                        for no_go in ([], [box(590, 10, 592, 12)]))
+        assert [r.cost for r in beside.routes] == [r.cost for r in free.routes] and free.states >= beside.states > 0
+
+
+def test_a_goal_behind_a_wall_costs_no_search():
+    """Red: every place before the wall is looked at."""
+    found = plan(NONE, BERG, (50, 200), (550, 200), extent=(0, 0, 600, 400), no_go=[box(300, -50, 320, 450)])
+    assert found.status == "no_route" and found.states == 0
+
+
 def test_a_way_is_found_where_there_is_one():
     """100 fields of obstacles: a flood fill with a slightly larger hull finds a way => the planner does => one with a
     slightly smaller hull does. Both outcomes are frequent."""
