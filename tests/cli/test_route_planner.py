@@ -74,6 +74,25 @@ def test_a_disc_is_passed_on_its_tangents(a, clearance, d):
     assert r.clearance >= clearance - 0.05 and found.routes[0].faults == ("no_go",)
 
 
+@pytest.mark.parametrize("over, under", [((200, 260), (400, 140)), ((180, 220), (330, 120)), ((250, 300), (400, 160))])
+def test_a_slalom_is_a_taut_string(over, under):
+    """Round the tips of two wedges, whose circles of the hull's radius the path can follow: tangents and arcs. Red
+    at 0.33 to 0.76 % too long where corners stay as they were found."""
+    a, b, radius = (40, 90), (560, 310), BERG.radius
+    wedges = [np.array([(over[0] - 20, -30), (over[0] + 20, -30), over], float),
+              np.array([(under[0] - 20, 430), under, (under[0] + 20, 430)], float)]
+    r = best(plan(NONE, BERG, a, b, extent=(0, 0, 600, 400), no_go=wedges, radius=radius, routes=1))
+
+    def course(p, q):
+        return math.atan2(q[1] - p[1], q[0] - p[0]), math.dist(p, q)
+    (to, first), (across, middle), (away, last) = course(a, over), course(over, under), course(under, b)
+    between = across - math.asin(2 * radius / middle)
+    exact = (math.sqrt(first ** 2 - radius ** 2) + math.sqrt(middle ** 2 - 4 * radius ** 2)
+             + math.sqrt(last ** 2 - radius ** 2)
+             + radius * (to + math.asin(radius / first) + away + math.asin(radius / last) - 2 * between))
+    assert exact * (1 - 1e-9) <= r.length <= 1.003 * exact
+
+
 def test_the_gap_that_the_hull_fits_through():
     """A wall with a gap of the hull's diameter, and clearance on both sides, less or more 1 %. Red: a tolerance."""
     for by, status in (0.99, "no_route"), (1.01, "ok"):
