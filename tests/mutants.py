@@ -26,6 +26,8 @@ ENDS = ["cli/test_faults.py::test_what_is_made_stands_in_this_order",
 OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
            "scenes:line_bridle_breaks,thrust,impacts_sine"]
 
+PLAN = "cli/test_route_planner.py::test_"
+
 MUTANTS = {
     "src/force/laws.h": (DRAG, [
         ("b->drag->water_form * b->exposure->water_form", "0", "no form drag of the water"),
@@ -903,6 +905,46 @@ MUTANTS = {
         ("if (h->steps > 0 && step % h->steps == 0) bits |= save;", "", "no checkpoint by steps"),
         ("        h->saves_seen = saves_asked;\n        bits", "        bits",
          "a checkpoint at every step after a signal"),
+    ]),
+    "src/route/shorten.c": ([PLAN + "a_slalom_is_a_taut_string", "cli/test_route_planner.py"], [
+        ("any = move_all(p, w, &tried) || any;", "(void)move_all;", "corners stay as they were found"),
+        ("bool any = leave_out(p, w, &tried);", "bool any = false; (void)leave_out;", "no corner is left out"),
+        ("any = put_in(p, w, &tried) || any;", "(void)put_in;", "no corner is put in"),
+        ("goal[0] = g[0] - u[0] * t,", "goal[0] = g[0] + u[0] * t,", "the goal drifts to the wrong side"),
+    ]),
+    "src/route/lattice.c": ([PLAN + "what_keeps_out_elsewhere_changes_no_plan", PLAN + "a_maze_is_crossed_by_its_openings",
+                             "cli/test_route_planner.py"], [
+        ("(1 - 1e-9) * l->per_step * steps)", "2 * l->per_step * steps)", "a bound above the cost"),
+        ("if (bound < 0) continue;", "if (bound <= 0) continue;", "no way to the goal's own place"),
+        ("p->no_go.need - 0.708 * l->h;", "p->no_go.need + 0.708 * l->h;", "squares that a corner leads through are shut"),
+        ("int64_t)ceil((factor * measure + turn) / s->unit);", "int64_t)ceil(measure / s->unit);",
+         "routes found before do not repel"),
+        ("a < cut - 1e-9 * l->h || b < cut - 1e-9 * l->h ||", "", "turns that their arcs do not fit into"),
+    ]),
+    "src/route/no_go.c": ([PLAN + "the_gap_that_the_hull_fits_through",
+                           "cli/test_route_planner.py"], [
+        ("if (d < 0) found |= BT_ROUTE_IN_NO_GO;", "if (d < -g->need) found |= BT_ROUTE_IN_NO_GO;",
+         "the centre may go where the hull may not"),
+        ("at[0] + u[0] * now, at[1] + u[1] * now) - g->need;", "at[0], at[1]) - g->need;",
+         "polygons stay where the ice goes by"),
+        ("if (inside) return true;", "", "inside is free"),
+    ]),
+    "src/route/swath.c": ([PLAN + "the_ice_of_a_bend_is_that_of_a_ring",
+                           "cli/test_route_planner.py"], [
+        ("bt_max(0, 1 - leg->turn * aside)", "1", "the inner side of an arc counts as the outer one"),
+        ("best.over == c.over && better", "better", "a speed above the force limit is taken"),
+        ("const double wider = half > 0 ? sqrt(2 * half / bt_sin(2 * half)) : 1,", "const double wider = 1,",
+         "chords in place of arcs"),
+        ("d * bt_hypot(x, y) * (x * tx + y * ty)", "d * (x * x + y * y)", "drag of the water from every side"),
+    ]),
+    "src/route/ice.c": ([PLAN + "terms_of_the_force", "cli/test_route_planner.py"], [
+        ("bt_min(1, cap)", "1", "no cap by rafting"),
+        ("bt_max(0, sqrt(4 * area / BT_PI) / t->width - 1)", "0", "a wide floe counts as a narrow one"),
+        ("(1 + t->added_mass) * v * v", "v * v", "the water that floes take along is left out"),
+    ]),
+    "src/route/plan.c": ([PLAN + "routes_are_a_width_apart", "cli/test_route_planner.py"], [
+        ("kept = kept && apart(r, &plan->route[a]) > t->width;", "(void)apart;", "routes on top of each other"),
+        ("plan->route[b].cost < plan->route[b - 1].cost", "false", "routes in the order in which they are found"),
     ]),
 }
 

@@ -12,8 +12,9 @@
 // everywhere. What is found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move,
 // without the error of half of q and of half a step of headings, but thirty times as long.
 // Order. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a
-// metre times the distance to the goal) down: sums do not depend on their order, and of equal costs the lower index
-// goes first.
+// metre times the distance to the goal, straight or by the squares that the berg's centre may be in, whichever is
+// longer) down: sums do not depend on their order, and of equal costs the lower index goes first. A goal that no chain
+// of squares leads to is given up at once.
 #include "route/lattice.h"
 
 #include "base/elementary.h"
@@ -24,6 +25,7 @@
 enum { MOST_HEADINGS = 32, MOST_MOVES = 7 };
 #define UNITS 1e5 ///< of cost in the least cost of a spacing
 #define THERE 0.75 ///< spacings from the goal
+#define UNREACHED INT32_MAX
 
 typedef struct move {
     int dx, dy, heading;     ///< places; heading after it
@@ -47,6 +49,7 @@ struct bt_lattice {
     double unit[MOST_HEADINGS][2];
     move of[MOST_HEADINGS][MOST_MOVES];
     int n_moves[MOST_HEADINGS];
+    double per_step;         ///< least length of a move over the steps that it is made of, m (steps_of)
     int fine, pad, wide, high; ///< q = h/fine; places of slices beside the lattice; of slices along x and y
     float *across;           ///< [high][wide][n_headings/2][n_speeds] mean load of a slice, N: one cache line a place
 };
@@ -202,6 +205,25 @@ static void make_mask(const bt_lattice *l, move *m)
     }
 }
 
+/// A move cut into steps, each from the square about a place to the same or one of the eight squares about that one: how
+/// many. Few, not the fewest.
+static int steps_of(const bt_lattice *l, const move *m)
+{
+    enum { FINE = 32 };
+    int steps = 0, x0 = 0, y0 = 0, x1 = 0, y1 = 0; // squares: of the last step, and the last one beside it
+    for (int g = 0; g < m->n_legs; g++) {
+        const int n = (int)ceil(m->leg[g].length / l->h * FINE);
+        for (int a = 1; a <= n; a++) {
+            double at[2], t[2];
+            bt_leg_at(&m->leg[g], m->leg[g].length * a / n, at, t);
+            const int x = (int)floor(at[0] / l->h + 0.5), y = (int)floor(at[1] / l->h + 0.5);
+            if (abs(x - x0) > 1 || abs(y - y0) > 1) x0 = x1, y0 = y1, steps++;
+            x1 = x, y1 = y;
+        }
+    }
+    return steps + (x1 != x0 || y1 != y0);
+}
+
 bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing, double cell)
 {
     const bt_route_task *t = &p->task;
@@ -209,6 +231,12 @@ bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing,
     l->p = p, l->h = spacing, l->ax = ax, l->ay = ay;
     choose_headings(l, t->headings);
     make_moves(l, t->radius);
+    l->per_step = INFINITY;
+    for (int k = 0; k < l->n_headings; k++)
+        for (int m = 0; m < l->n_moves[k]; m++) {
+            const int steps = steps_of(l, &l->of[k][m]);
+            if (steps > 0) l->per_step = bt_min(l->per_step, l->of[k][m].length / steps);
+        }
     double longest = 0, low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int k = 0; k < l->n_headings; k++)
         for (int m = 0; m < l->n_moves[k]; m++) longest = bt_max(longest, l->of[k][m].length);
@@ -304,6 +332,7 @@ typedef struct search {
     int64_t *cost;        ///< [states]
     int32_t *from;
     float *time;          ///< s; NULL = nothing moves
+    int32_t *steps;       ///< [places] to the goal round what is kept out of, at least; NULL = not known
     uint8_t *by, *done;
     heap open;
 } search;
@@ -317,10 +346,50 @@ static double to_goal(const search *s, int i, int j)
     return bt_hypot(x - f * ex, y - f * ey);
 }
 
+/// Steps from square to square, of those that the berg's centre may be in, from each place to the nearest at the goal:
+/// breadth first from there. No move makes more of them than its length / per_step, and from place to place of a move their
+/// number falls by no more than it makes: the bound that follows is admissible and consistent. Where polygons move in
+/// the frame of the ice there is none; nor where a hull smaller than a square may leave the squares of the lattice.
+static void count_steps(search *s)
+{
+    const bt_lattice *l = s->l;
+    const bt_planner *p = l->p;
+    if (p->no_go.n == 0 || s->time || p->task.reach < 0.5 * l->h) return;
+    const int32_t n = (int32_t)(l->nx * l->ny);
+    int32_t *queue = bt_alloc((size_t)n, sizeof *queue), head = 0, tail = 0;
+    s->steps = bt_alloc((size_t)n, sizeof *s->steps);
+    const double least = p->no_go.need - 0.708 * l->h; // of the middle of a square of which a corner may be free
+    for (int32_t k = 0; k < n; k++) {
+        const int i = l->i0 + k % l->nx, j = l->j0 + k / l->nx;
+        const double *o = p->task.start, x = i * l->h, y = j * l->h;
+        s->steps[k] = UNREACHED;
+        if (to_goal(s, i, j) <= THERE * l->h) s->steps[queue[tail++] = k] = 0;
+        else if (bt_no_go_distance(&p->no_go, o[0] + x * l->ax - y * l->ay, o[1] + x * l->ay + y * l->ax) < least)
+            s->steps[k] = -1;
+    }
+    while (head < tail) {
+        const int32_t k = queue[head++];
+        for (int side = 0; side < 9; side++) {
+            const int i = k % l->nx + side % 3 - 1, j = k / l->nx + side / 3 - 1;
+            if (i < 0 || j < 0 || i >= l->nx || j >= l->ny || s->steps[j * l->nx + i] != UNREACHED) continue;
+            s->steps[j * l->nx + i] = s->steps[k] + 1;
+            queue[tail++] = j * l->nx + i;
+        }
+    }
+    for (int32_t k = 0; k < n; k++)
+        if (s->steps[k] < 0) s->steps[k] = UNREACHED;
+    free(queue);
+}
+
+/// Of the cost from a place to the goal, in units; −1: no way leads there.
 static int64_t bound_of(const search *s, int i, int j)
 {
+    const bt_lattice *l = s->l;
+    const int32_t steps = s->steps ? s->steps[(j - l->j0) * l->nx + (i - l->i0)] : 0;
+    if (steps == UNREACHED) return -1;
     if (s->objective == BT_ROUTE_PEAK) return 0;
-    return (int64_t)(bt_max(0, to_goal(s, i, j) - THERE * s->l->h) * s->least / s->unit);
+    return (int64_t)(bt_max(bt_max(0, to_goal(s, i, j) - THERE * l->h), (1 - 1e-9) * l->per_step * steps) * s->least /
+                     s->unit);
 }
 
 static double least_cost(const bt_planner *p, int objective)
@@ -421,6 +490,8 @@ static void look(search *s, int32_t from, int i, int j, int k)
         const bool peak = s->objective == BT_ROUTE_PEAK;
         // what it costs at least
         if (s->cost[to] <= so_far + (peak ? 0 : (int64_t)(m->length * s->least / s->unit))) continue;
+        const int64_t bound = bound_of(s, x, y);
+        if (bound < 0) continue;
         double took;
         const int64_t more = price(s, m, i, j, s->time ? s->time[from] : 0, &took);
         if (more < 0) continue;
@@ -430,7 +501,7 @@ static void look(search *s, int32_t from, int i, int j, int k)
         s->from[to] = from;
         s->by[to] = (uint8_t)a;
         if (s->time) s->time[to] = (float)(s->time[from] + took);
-        push(&s->open, (entry){cost + bound_of(s, x, y), to});
+        push(&s->open, (entry){cost + bound, to});
     }
 }
 
@@ -495,11 +566,13 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
     s.done = bt_alloc(states, sizeof *s.done);
     if (t->drift[0] != 0 || t->drift[1] != 0) s.time = bt_alloc(states, sizeof *s.time);
     for (size_t k = 0; k < states; k++) s.cost[k] = INT64_MAX, s.from[k] = -1;
+    count_steps(&s);
     for (int k = 0; k < l->n_headings; k++) {
         if (!isnan(t->start_heading) && k > 0) break; // the frame's x axis is the heading
         const int32_t at = (-l->j0 * l->nx - l->i0) * l->n_headings + k;
         s.cost[at] = 0;
-        push(&s.open, (entry){bound_of(&s, 0, 0), at});
+        const int64_t bound = bound_of(&s, 0, 0);
+        if (bound >= 0) push(&s.open, (entry){bound, at});
     }
     *f = (bt_lattice_way){0};
     bool found = false;
@@ -521,6 +594,7 @@ bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, doubl
     free(s.by);
     free(s.done);
     free(s.time);
+    free(s.steps);
     free(s.open.e);
     return found;
 }

@@ -19,7 +19,7 @@ from harness import BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed
 import bergtow
 from bergtow.errors import RunError
 from bergtow.result.run import Run
-from bergtow.routing import apart, horizon, members, situation, tows, verdict
+from bergtow.routing import apart, horizon, members, route, situation, tows, verdict
 
 BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
                 body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
@@ -405,6 +405,100 @@ def test_a_new_look_leaves_the_way_so_far(tmp_path):
     for early, late in zip(series, series[1:]):
         assert np.array_equal(early, late[:len(early)])
     assert all(t["arrived"] for t in found["horizon"]["tows"].values())
+
+
+#: a small berg on a line; a shoal on the straight way
+LINE = {"run": {"dt": 4, "duration": 800}, "domain": {"frame": "geographic", "length": 560, "width": 360, "x0": 0,
+                                                      "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0.35, "size": 25, "thickness": 0.6, "seed": 3},
+        "body": {"length": 40, "draft": 25, "x": 90, "y": 0},
+        "tow": {"mode": "line", "speed": 0.5, "line_length": 60, "line_stiffness": "20 MN", "ramp": 100}}
+LOOKS = ("--to", "400,0", "--clearance", "15 m", "--routes", "1", "--replan", "150 s", "--map-age", "50 s", "--map-error", "4 m", "--members",
+         "2", "--no-go", "shoal.geojson")
+
+
+def towed_on_a_line(folder):
+    folder.mkdir()
+    write_case(folder, LINE)
+    shoal = {"type": "Polygon", "coordinates": [[[-60, 250], [10, 250], [10, 270], [-60, 270], [-60, 250]]]}
+    (folder / "shoal.geojson").write_text(json.dumps(local(shoal)))
+    return folder
+
+
+def test_looks_from_a_line(tmp_path):
+    """Round a shoal, with a map of some age and errors; killed between looks, the same call ends as if it had not been.
+    Red: what is decided is the way of the body; looks are drawn anew; the tow through the shoal counts as one."""
+    whole, killed = towed_on_a_line(tmp_path / "whole"), towed_on_a_line(tmp_path / "killed")
+    done = script("route", "case.yml", *LOOKS, "-o", "out", cwd=whole)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((whole / "out/route.json").read_text())
+    towed = found["horizon"]["tows"]
+    assert len(found["rounds"]) >= 4 and not found["horizon"]["perfect"] and "upper bound" not in done.stdout
+    assert towed["horizon"]["arrived"] and "no_go_contact" not in towed["horizon"]["faults"]
+    assert "no_go_contact" in towed["straight"]["faults"]
+    assert re.search("straight line: [^;]*touches an area to keep out of", done.stdout)
+    series = []
+    for name in ("look-1", "look-2", "look-3", "tow-horizon"):
+        with Run(whole / "out/route" / name / "f001") as r:
+            series.append(np.column_stack([r["body_x"], r["body_y"], r["line_tension"]]))
+    for early, late in zip(series, series[1:]):
+        assert np.array_equal(early, late[:len(early)])
+    env = environment(BERGTOW=BERGTOW, PYTHONPATH=ROOT / "postproc")
+    process = subprocess.Popen([sys.executable, "-m", "bergtow", "route", "case.yml", *LOOKS, "-o", "out"], env=env,
+                               cwd=killed, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while process.poll() is None and not (killed / "out/route/look-2/f001/finished").exists():
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    assert not (killed / "out/horizon.yml").exists()
+    again = script("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)
+    assert again.returncode == DONE, again.stderr
+    other = json.loads((killed / "out/route.json").read_text())
+    assert other["rounds"] == found["rounds"]
+    assert [t["hash"] for t in other["horizon"]["tows"].values()] == [t["hash"] for t in towed.values()]
+
+
+def test_a_line_that_parts_ends_the_looks(tmp_path):
+    """Red: the rest is planned from where no body is."""
+    write_case(tmp_path, changed(LINE, tow=LINE["tow"] | {"line": {"breaking_load": "20 kN"}}))
+    done = script("route", "case.yml", "--to", "400,0", "--routes", "1", "--replan", "150 s", "--members", "1", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert len(found["rounds"]) == 1 and {"missed", "parted"} <= {*found["horizon"]["tows"]["horizon"]["faults"]}
+
+
+def test_the_estimate_of_looks():
+    """Against a sum: tows of a second for each second of theirs, up to 300 and 600 of 700 s, a second more for frames,
+    and plans of 0.5 s. Red: looks that are as long as the tow; the last look at its end."""
+    c = SimpleNamespace(route=SimpleNamespace(duration=700.0), seconds=800.0)
+    assert horizon.estimate(c, 300.0, (801.0, 800.0, None), 0.5) == (2, 300 + 600 + 2 * 1.5 + 3 * 801)
+    assert horizon.estimate(c, 700.0, (801.0, 800.0, None), 0.5) == (0, 3 * 801)
+
+
+def test_the_estimate_of_the_tows(monkeypatch):
+    """Of `bergtow check`: 3 s of the tow that keeps frames, 2 s of another; by a clock that goes twice as slow, twice
+    as much. Red: the tow with frames stands for the others; one at a time stands for several; a tow that is there."""
+    def candidate(seconds):
+        return SimpleNamespace(name="straight", seconds=seconds, keys={})
+    some, clock = [candidate(100.0), candidate(150.0)], [0.0]
+    s = SimpleNamespace(values={"ice.outlines": ""}, field="ice.h5", case="case.yml")
+    runs = SimpleNamespace(program="bergtow", jobs=2, made=0, sets=lambda i, keys: [i])
+    monkeypatch.setattr(route, "checked", lambda program, case, sets, words: json.dumps(
+        {"cost": {"core_time_s": 3 - sets[0]}}))
+    told = route.estimate(runs, s, some, 5)
+    assert told == (3, 2, 2.5 * (3 * 2 + 0.5))
+
+    def tow(runs, name, members, keys):
+        assert 0 not in members
+        clock[0] += 4 * -(-len(members) // runs.jobs)
+        runs.made += len(members)
+        return [None for _ in members]
+    monkeypatch.setattr(route, "tow", tow)
+    monkeypatch.setattr(route.time, "monotonic", lambda: clock[0])
+    assert route.piloted(runs, some[0], 5, told) == pytest.approx(2 * told[-1])
+    monkeypatch.setattr(route, "tow", lambda runs, name, members, keys: [None for _ in members])
+    assert route.piloted(runs, some[0], 5, told) is None
 
 
 def test_the_function_is_the_command(routed, tmp_path):

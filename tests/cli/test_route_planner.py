@@ -74,6 +74,25 @@ def test_a_disc_is_passed_on_its_tangents(a, clearance, d):
     assert r.clearance >= clearance - 0.05 and found.routes[0].faults == ("no_go",)
 
 
+@pytest.mark.parametrize("over, under", [((200, 260), (400, 140)), ((180, 220), (330, 120)), ((250, 300), (400, 160))])
+def test_a_slalom_is_a_taut_string(over, under):
+    """Round the tips of two wedges, whose circles of the hull's radius the path can follow: tangents and arcs. Red
+    at 0.33 to 0.76 % too long where corners stay as they were found."""
+    a, b, radius = (40, 90), (560, 310), BERG.radius
+    wedges = [np.array([(over[0] - 20, -30), (over[0] + 20, -30), over], float),
+              np.array([(under[0] - 20, 430), under, (under[0] + 20, 430)], float)]
+    r = best(plan(NONE, BERG, a, b, extent=(0, 0, 600, 400), no_go=wedges, radius=radius, routes=1))
+
+    def course(p, q):
+        return math.atan2(q[1] - p[1], q[0] - p[0]), math.dist(p, q)
+    (to, first), (across, middle), (away, last) = course(a, over), course(over, under), course(under, b)
+    between = across - math.asin(2 * radius / middle)
+    exact = (math.sqrt(first ** 2 - radius ** 2) + math.sqrt(middle ** 2 - 4 * radius ** 2)
+             + math.sqrt(last ** 2 - radius ** 2)
+             + radius * (to + math.asin(radius / first) + away + math.asin(radius / last) - 2 * between))
+    assert exact * (1 - 1e-9) <= r.length <= 1.003 * exact
+
+
 def test_the_gap_that_the_hull_fits_through():
     """A wall with a gap of the hull's diameter, and clearance on both sides, less or more 1 %. Red: a tolerance."""
     for by, status in (0.99, "no_route"), (1.01, "ok"):
@@ -135,6 +154,23 @@ def test_a_maze_is_crossed_by_its_openings():
         assert len(crossed) == 1 and abs(r.y[crossed[0]] - y) <= 6.1
     other = 2 * grid_length(room(walls, extent, 2) >= BERG.radius - 1e-9, (15, 100), (285, 100))
     assert other / 1.09 <= r.length <= 1.005 * other
+
+
+def test_what_keeps_out_elsewhere_changes_no_plan():
+    """A box in a corner, of no consequence but that steps round what is kept out of are counted: the same routes, and
+    no more states. Red: a bound that is not below the cost, or that falls along a move by more than the move costs."""
+    for seed, radius in (5, 0), (6, 25):
+        outlines, thickness = floes(200, 600, 400, seed)
+        options = {"extent": (0, 0, 600, 400), "radius": radius, "routes": 3, "weights": PLOUGH}
+        free, beside = (plan(Ice(outlines, thickness), BERG, (40, 60), (560, 340), no_go=no_go, **options)
+                        for no_go in ([], [box(590, 10, 592, 12)]))
+        assert [r.cost for r in beside.routes] == [r.cost for r in free.routes] and free.states >= beside.states > 0
+
+
+def test_a_goal_behind_a_wall_costs_no_search():
+    """Red: every place before the wall is looked at."""
+    found = plan(NONE, BERG, (50, 200), (550, 200), extent=(0, 0, 600, 400), no_go=[box(300, -50, 320, 450)])
+    assert found.status == "no_route" and found.states == 0
 
 
 def test_a_way_is_found_where_there_is_one():

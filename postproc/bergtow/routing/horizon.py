@@ -14,7 +14,7 @@ import dataclasses
 from bergtow import writing
 from bergtow.errors import CASE, IO, USAGE, RunError
 from bergtow.result.run import Run
-from bergtow.routing import members, output, situation, tows
+from bergtow.routing import members, output, situation, tows, verdict
 from bergtow.study.runs import SPENT
 from bergtow.text import route as words
 
@@ -96,7 +96,8 @@ class Horizon:
         """The outcome of a tow along all of a polyline, and its folder."""
         path = self.tow(name, points, self.duration(points))
         with Run(path) as run:
-            return tows.outcome(run, c, self.goal, self.s, self.w["limit"]), path
+            out = tows.outcome(run, c, self.goal, self.s, self.w["limit"])
+        return out | {"faults": [f for f in (*verdict.FAULTS, "no_load") if verdict.fault(out, f)]}, path
 
     def duration(self, points):
         way = np.sum(np.hypot(*np.diff(points, axis=0).T))
@@ -108,7 +109,7 @@ class Horizon:
         return self.speed * (time - ramp / 2 if time > ramp else time ** 2 / (2 * ramp) if ramp > 0 else time)
 
     def look(self, k, time, points):
-        """(ice, start, heading, decided points) at a look."""
+        """(ice, start, heading, decided points) at a look; None once the goal is reached or the line has parted."""
         s = self.s
         points, last = with_point(points, self.way(time))
         decided, tangent = points[:last + 1], points[last] - points[last - 1]
@@ -120,6 +121,10 @@ class Horizon:
             ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in s.moving],
                                       thickness=run.thickness[s.moving])
             body = np.array([run["body_x"][-1], run["body_y"][-1]])
+            broken = sum(e["kind"] == "line_broken" for e in run.events)
+            if (tows.to_goal(body[None], self.goal)[0] <= tows.ARRIVED * s.hull.width
+                    or 0 < s.values["tow.line.branches"] <= broken):
+                return None
             if s.mode == "speed":
                 start, heading = decided[-1], np.arctan2(*tangent[::-1])
             else:
@@ -127,6 +132,15 @@ class Horizon:
                 heading = np.arctan2(*line[::-1])
                 start = decided[-1] - s.line * line / np.hypot(*line)
         return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided
+
+
+def estimate(c, every, told, planning):
+    """(looks, seconds of all): of the tows up to each look, one after the other, of the three whole ones, and of the
+    plans. c: a Candidate; told: route.estimate(); planning: s, of a plan."""
+    replay, plain, _ = told
+    looks = max(0, min(MOST - 1, int(np.ceil(c.route.duration / every)) - 1))
+    up_to = plain * every / c.seconds * looks * (looks + 1) / 2
+    return looks, up_to + looks * (replay - plain + planning) + 3 * replay
 
 
 def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
@@ -162,7 +176,10 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
         time = k * w["replan"]
         if left <= w["replan"]:
             break
-        ice, start, heading, decided = h.look(k, time, points)
+        there = h.look(k, time, points)
+        if there is None:
+            break
+        ice, start, heading, decided = there
         new = command.planned(a, w, s, goal, weights, factor, ice=ice, start=start, start_heading=heading)
         route = best(new, heading, a.headings)
         if route:

@@ -19,7 +19,7 @@ from bergtow._program import program_path
 from bergtow.arguments import not_below_zero, whole_from
 from bergtow.errors import CASE, IO, USAGE, RunError
 from bergtow.result.run import Run
-from bergtow.routing import apart, members, output, planner, situation, tows, verdict
+from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
 from bergtow.study import analysis
 from bergtow.study.runs import SPENT, checked, locked
 from bergtow.text import route as words
@@ -380,15 +380,17 @@ def perform(a):
                   "lies a width apart from these.")
         n = 1 if w["errors"].none else a.members
         told = estimate(runs, s, some, n)
+        how = f"{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, {a.jobs} at a time"
         found["estimate_s"] = told[-1]
-        print(f"\n{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, rough estimate "
-              f"{words.amount(told[-1], 's')} with {a.jobs} at a time\n", flush=True)
+        if w["replan"]:
+            looks, found["estimate_s"] = horizon.estimate(some[0], w["replan"], told, found["plan_s"])
+            how = f"{looks} looks, each at the end of a tow from the start, and three whole tows, one at a time"
+        print(f"\n{how}: rough estimate {words.amount(found['estimate_s'], 's')}\n", flush=True)
         if a.plan_only:
             print(words.answer(writing.plain(found)))
             print(folder / "route.json")
             return
         if w["replan"]:
-            from bergtow.routing import horizon
             horizon.follow(a, w, s, goal, weights, factor, runs, files, found, plan)
         else:
             verify(a, w, s, goal, some, n, runs, files, found, told)

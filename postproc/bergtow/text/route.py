@@ -136,10 +136,10 @@ def rounds(found, markdown=False):
     head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
     rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),
              amount(r["length"], "m"), amount(r["work"], "J"),
-             r["status"]] for r in found["rounds"]]
+             "new" if r["length"] is not None else "as before, since none is allowed"] for r in found["rounds"]]
     names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
-    told = "; ".join(f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}"
-                     f"{'' if t['arrived'] else ' (goal missed)'}" for k, t in h["tows"].items())
+    told = "; ".join(", ".join([f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}",
+                                *(FAULTS[f] for f in t["faults"])]) for k, t in h["tows"].items())
     bound = ("The looks are perfect: what is gained is an upper bound. " if h["perfect"] else "")
     return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
            f"{told}. {bound}One tow is one sample, and has no interval."
