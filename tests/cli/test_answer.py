@@ -395,6 +395,19 @@ def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
     assert any("the sample does not know the tail" in text for text in said)
 
 
+def test_thicknesses_and_winds_beside_those_of_the_case():
+    """Winds are from ahead, whatever the course. Red: along x on any course."""
+    a = SimpleNamespace(thicknesses=[2.0], winds=[10.0])
+    case = {"ice.thickness": "1.2 m", "tow.direction": "0 rad", "air.wind_x": "0 m/s", "air.wind_y": "3 m/s"}
+    assert design.varied(a, {"case": case}) == {
+        "ice.thickness": {"1.2 m": {}, "2 m": {}},
+        "air.wind_x": {"0 m/s": {"air.wind_y": "3 m/s"}, "-10 m/s": {"air.wind_y": "0 m/s"}}}
+    east = design.varied(a, {"case": case | {"tow.direction": f"{math.radians(120)} rad"}})["air.wind_y"]
+    assert east == {"3 m/s": {"air.wind_x": "0 m/s"}, "-8.66025 m/s": {"air.wind_x": "5 m/s"}}
+    none = SimpleNamespace(thicknesses=[], winds=[])
+    assert design.varied(none, {"case": case}) == {}
+
+
 def test_the_vessel_has_to_hold_the_largest_load_case():
     """Red: "can tow" by the steady tow, beside a bollard pull that the design value does not leave."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)

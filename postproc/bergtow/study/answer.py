@@ -238,7 +238,7 @@ def feasible(some, asked, v, efficiency, t, top=None):
            "not_above_m_s": None, "by": None, "reason": None}
     if not np.isfinite(v.pull):
         return out | {"verdict": "not_asked", "reason": "no_vessel"}
-    if here and top and top["id"] != "case.steady":
+    if here and here["feasible"] != "no" and top and top["id"] != "case.steady":
         return out | {"verdict": gear.verdict(top["n"], top["interval_95"], here["has_n"]), "reason": "other_load_case"}
     if len(some) > 1:
         limit = gear.limit_speed([s["speed_m_s"] for s in some], [s["needs_n"] for s in some],
