@@ -456,7 +456,7 @@ static void judge_length(bt_steady *s, const bt_case *c, double dt)
     bt_warn(reasons, BT_WARN_FEW_SAMPLES,
             "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
             "longer",
-            (double)s->n * dt, (double)s->n / (2 * worst->mean.tau), worst->name, worst->mean.tau * dt,
+            (double)s->n * dt, floor(10 * (double)s->n / (2 * worst->mean.tau)) / 10, worst->name, worst->mean.tau * dt,
             BT_STEADY_INDEPENDENT);
     bt_warn_name(reasons, "series", worst->key);
 }

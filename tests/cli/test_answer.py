@@ -395,6 +395,58 @@ def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
     assert any("the sample does not know the tail" in text for text in said)
 
 
+def test_thicknesses_and_winds_beside_those_of_the_case():
+    """Winds are from ahead, whatever the course. Red: along x on any course."""
+    a = SimpleNamespace(thicknesses=[2.0], winds=[10.0])
+    case = {"ice.thickness": "1.2 m", "tow.direction": "0 rad", "air.wind_x": "0 m/s", "air.wind_y": "3 m/s"}
+    assert design.varied(a, {"case": case}) == {
+        "ice.thickness": {"1.2 m": {}, "2 m": {}},
+        "air.wind_x": {"0 m/s": {"air.wind_y": "3 m/s"}, "-10 m/s": {"air.wind_y": "0 m/s"}}}
+    east = design.varied(a, {"case": case | {"tow.direction": f"{math.radians(120)} rad"}})["air.wind_y"]
+    assert east == {"3 m/s": {"air.wind_x": "0 m/s"}, "-8.66025 m/s": {"air.wind_x": "5 m/s"}}
+    none = SimpleNamespace(thicknesses=[], winds=[])
+    assert design.varied(none, {"case": case}) == {}
+
+
+def test_the_vessel_has_to_hold_the_largest_load_case():
+    """Red: "can tow" by the steady tow, beside a bollard pull that the design value does not leave."""
+    v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
+    some = [{"speed_m_s": 0.5, "needs_n": 2e5, "has_n": 4.9e5, "feasible": "yes"}]
+    def case(name, n, interval=None):
+        return {"id": name, "n": n, "interval_95": interval}
+    t = tow(water=1e5, wind=0.0)
+    assert answer.feasible(some, 0.5, v, 1.0, t, case("case.steady", 2e5))["not_above_m_s"] > 0.5
+    for n, interval, verdict in ((6e5, None, "no"), (3e5, None, "yes"), (4e5, (3e5, 6e5), "open")):
+        found = answer.feasible(some, 0.5, v, 1.0, t, case("case.head_sea", n, interval))
+        assert (found["verdict"], found["not_above_m_s"]) == (verdict, None)
+
+
+def bend(**case):
+    """The course change of a tow of 3 km at 0.5 m/s that begins at (-1, 0) km of a domain of 3 by 1 km."""
+    made = {}
+    def make(name, sets, fields):
+        made.update(sets)
+        return "run_failed"
+    at = {"body.x": "-1000 m", "body.y": "0 m", "domain.x0": "-1500 m", "domain.y0": "-500 m", "domain.length": "3000 m",
+          "domain.width": "1000 m", "domain.ends": "open", "domain.sides": "wall", "tow.mode": "speed"} | case
+    t = tow(case=at, speed=0.5, distance=3000.0, width=40.0, slower=1.0, case_ramp=100.0, direction=0.0)
+    row = load_cases.course_change(t, SimpleNamespace(make=make, few=range(2)), 30.0, 400.0)
+    return row, json.loads(made["tow.waypoints"])[0][0] if made else None
+
+
+def test_where_a_bend_lies():
+    """The corner of a prescribed body is a tangent beyond ramp and settling; on a line it is that of the towing end, and
+    a vessel turns as far before as it looks. A bend that leads into a wall is refused. Red: no line; no walls."""
+    tangent = 400 * math.tan(math.radians(15))
+    row, x = bend()
+    assert row["reason"] == "run_failed" and x == pytest.approx(-1000 + 0.5 * (50 + 300) + tangent)
+    line = {"tow.mode": "line", "tow.line_length": "300 m", "tow.hull_x": "20 m"}
+    assert bend(**line)[1] == pytest.approx(x + 320)
+    assert bend(**line | {"tow.mode": "thrust", "tow.vessel.lookahead": "300 m"})[1] == pytest.approx(x + 620)
+    assert bend(**{"domain.width": "200 m", "domain.y0": "-100 m"})[0]["reason"] == "domain_too_short"
+    assert bend(**{"domain.width": "200 m", "domain.y0": "-100 m", "domain.sides": "periodic"})[1] == pytest.approx(x)
+
+
 def test_a_body_that_is_held_and_not_towed(tmp_path, monkeypatch, capsys):
     """At a speed of zero there is no start, stop or bend. Red: a division by the speed."""
     monkeypatch.setenv("BERGTOW", str(BERGTOW))

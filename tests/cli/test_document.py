@@ -16,7 +16,8 @@ UNKNOWN = SimpleNamespace(bollard_pull=np.nan)
 
 
 def condition(label, **tow):
-    return {"label": label, "design": {"tow": tow}}
+    return {"label": label, "design": {"tow": tow}, "values": {"ice.concentration": int(label.split()[0]) / 100}
+            if "%" in label else {}}
 
 
 def value(key, text, kind="given", origin=""):
@@ -65,6 +66,17 @@ def test_the_vessel_draws_the_limit_by_the_upper_ends():
     assert re.search(r"15\.0 m/s with 0\.250 m/s of current.* 750 kN", found["wind"][1])
     answer["load_cases"][0]["n"] = None
     assert rows([], answer)[1]["wind"][1] == "not looked for"
+
+
+def test_limits_of_what_was_varied():
+    """Thickness and wind that differ between conditions are held against the vessel; one that does not is not. Red:
+    the concentration alone."""
+    some = {"conditions": [condition(name, largest=n) | {"values": {"ice.thickness": h, "air.wind_x": w}}
+                           for name, n, h, w in (("thin", 3e5, 0.8, -10.0), ("thick", 9e5, 1.6, -10.0))]}
+    _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=8e5))], VALUES, None)
+    found = {row[0]: row[2] for row in table["rows"]}
+    assert "within 800 kN" in found["thickness of the ice"] and found["thickness of the ice"].endswith(": thick")
+    assert found["wind"] == "not looked for"
 
 
 def test_the_check_by_hand_is_that_of_the_numbers_it_names(tmp_path):

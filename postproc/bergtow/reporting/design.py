@@ -31,7 +31,7 @@ from pathlib import Path
 
 from bergtow import arguments, writing
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, at_least_one, measure, minutes
+from bergtow.arguments import above_zero, at_least_one, measure, minutes, read
 from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
@@ -54,6 +54,7 @@ MARGIN = 0.95                # of what is left is given to fields
 FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
+UNITS = {"ice.thickness": "m", "air.wind_x": "m/s", "air.wind_y": "m/s"}
 BENDS = math.radians(1), math.radians(150)  # of the course change: what a body on a line can follow, assumed
 FEW = 5                      # fields below which nothing is known of the scatter between them
 CASES_SHARE, CASE_RUNS = 0.4, 34  # of the budget for load cases and ranges, at most, and how many runs these are
@@ -117,6 +118,24 @@ def at_speeds(a, found):
     return out
 
 
+def varied(a, found):
+    """{key: {text of a value: keys that go with it}} of thicknesses and winds beside those of the case. Winds are from
+    ahead; where the tow is along no axis both of their components change. found: answer.case_numbers()."""
+    out, case = {}, found["case"]
+    if a.thicknesses:
+        some = {answer.case_value(case, "ice.thickness"), *a.thicknesses}
+        out["ice.thickness"] = {f"{v:.9g} m": {} for v in sorted(some)}
+    if a.winds:
+        course = answer.case_value(case, "tow.direction", 0.0)
+        ahead = np.array([math.cos(course), math.sin(course)])
+        own = [answer.case_value(case, f"air.wind_{k}", 0.0) for k in "xy"]
+        some = [own, *(-v * ahead + 0.0 for v in a.winds)]
+        first, second = ("x", "y") if abs(ahead[0]) >= abs(ahead[1]) else ("y", "x")
+        texts = [{k: f"{v:.6g} m/s" for k, v in zip("xy", wind)} for wind in some]
+        out[f"air.wind_{first}"] = {t[first]: {f"air.wind_{second}": t[second]} for t in texts}
+    return out
+
+
 def write_study(a, case, repeats, wider):
     """The study of a case: DIR/design.yml. wider: domain.width by concentration, as of widths. Errors: RunError."""
     values = [] if reads_ice(case) else a.concentrations or []
@@ -129,6 +148,9 @@ def write_study(a, case, repeats, wider):
     if a.by_speed:
         parameters["tow.speed"] = list(a.by_speed)
         fitting |= {f"tow.speed={text}": keys for text, keys in a.by_speed.items() if keys}
+    for key, some in a.varied.items():
+        parameters[key] = list(some)
+        fitting |= {f"{key}={text}": keys for text, keys in some.items() if keys}
     study |= {name: some for name, some in (("parameters", parameters), ("with", fitting)) if some}
     if says(case, "output", "panels") is None and says(case, "tow", "mode") != "none":
         study["set"] = {"output.panels": True}
@@ -261,6 +283,9 @@ def beside(work, a, row, t, minutes):
     if ice is not None:
         given.append(f"ice.concentration={ice!r}")
         given += [f"domain.width={width}" for c, width in a.wider.items() if c == ice]
+    for key, of in a.varied.items():
+        text = min(of, key=lambda text: abs(read(text, UNITS[key]) - row["values"][key]))
+        given += [f"{name}={value}" for name, value in ({key: text} | of[text]).items()]
     some = assumed.applies(a.assumed, lambda key, default: answer.case_value(t.case, key, default),
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
     end = time.monotonic() + 60 * minutes
@@ -304,7 +329,7 @@ def answer_of(work, a, plan, began):
         cases, ramp, ranges, count = beside(work, a, row, t, left)
     now = time.monotonic()
     asked = {"concentrations": sorted({round(r["concentration"], 6) for r in rows}), "speed_m_s": asked_speed,
-             "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "vessel": a.vessel, "line": a.line,
+             "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "thicknesses_m": a.thicknesses, "winds_m_s": a.winds, "vessel": a.vessel, "line": a.line,
              "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
              "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
@@ -324,8 +349,9 @@ concentration = measure("%", lambda x: 0 <= x <= 0.95, "not from 0 to 95 %; give
 speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" or 0.8kn:1.4kn:4")
 
 
-def concentrations(text):
-    return sorted({concentration(part) for part in text.split(",")})
+def several(kind):
+    """Type of an option with several values, in order."""
+    return lambda text: sorted({kind(part) for part in text.split(",")})
 
 
 def speeds(text):
@@ -339,15 +365,19 @@ def speeds(text):
 
 
 def options(p):
-    p.set_defaults(by_speed={})
+    p.set_defaults(by_speed={}, varied={})
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
                    "where an earlier one ended")
     p.add_argument("--budget", type=minutes, metavar="MIN",
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
-    p.add_argument("--concentrations", type=concentrations, metavar="A,...", help="of a case (default: its own)")
+    p.add_argument("--concentrations", type=several(concentration), metavar="A,...", help="of a case (default: its own)")
     p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
+    p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="of a case: "
+                   "thicknesses of the ice beside its own, \"0.8 m,1.6 m\"")
+    p.add_argument("--winds", type=several(measure("m/s", lambda x: x >= 0, "below zero")), metavar="V,...", default=[],
+                   help="of a case: winds from ahead beside its own, \"10 m/s,20 m/s\"")
     p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
     p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
@@ -404,8 +434,10 @@ def planned(a, case, found, began):
     RunError."""
     own = answer.case_value(found["case"], "ice.concentration", 0.0)
     a.concentrations = a.concentrations or ([] if reads_ice(case) else [own])
-    a.by_speed = at_speeds(a, found)
-    n = max(1, len(a.concentrations)) * max(1, len(a.by_speed))
+    if a.thicknesses and reads_ice(case):
+        raise RunError(a.file, "reads its ice, which has the thickness of its floes", "leave --thicknesses out", CASE)
+    a.by_speed, a.varied = at_speeds(a, found), varied(a, found)
+    n = math.prod(max(1, len(some)) for some in (a.concentrations, a.by_speed, *a.varied.values()))
     end = ending(a, began, n)
     plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     if np.isfinite(end) and not a.no_load_cases:

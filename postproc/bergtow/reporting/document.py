@@ -79,7 +79,9 @@ def operation(s, cases, values, answer):
     for name, keys in LIMITING:
         said = " and ".join(text[k] for k in keys if k in text) or "–"
         limit = "not looked for"
-        if keys[0] == "ice.concentration" and np.isfinite(pull):
+        looked_at = keys[0] == "ice.concentration" or keys[0] != "tow.speed" and any(
+            len({c["values"].get(k) for c in s["conditions"]}) > 1 for k in keys)
+        if looked_at and np.isfinite(pull):
             limit = held(s, pull, what) or limit
         elif keys[0] == "air.wind_x" and head_sea and head_sea["n"]:
             air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))

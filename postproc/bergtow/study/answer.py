@@ -230,13 +230,16 @@ def speeds(rows, v, efficiency):
     return out
 
 
-def feasible(some, asked, v, efficiency, t):
-    """Can the vessel do it at the speed that is asked, and up to which?"""
+def feasible(some, asked, v, efficiency, t, top=None):
+    """Can the vessel do it at the speed that is asked, and up to which? Where another load case than the steady tow,
+    top, asks for more, the vessel has to hold that, and up to which speed it does nobody has looked at."""
     here = next((s for s in some if math.isclose(s["speed_m_s"], asked, rel_tol=1e-6)), None)
     out = {"id": "feasible", "speed_m_s": asked, "verdict": here["feasible"] if here else "not_asked",
            "not_above_m_s": None, "by": None, "reason": None}
     if not np.isfinite(v.pull):
         return out | {"verdict": "not_asked", "reason": "no_vessel"}
+    if here and here["feasible"] != "no" and top and top["id"] != "case.steady":
+        return out | {"verdict": gear.verdict(top["n"], top["interval_95"], here["has_n"]), "reason": "other_load_case"}
     if len(some) > 1:
         limit = gear.limit_speed([s["speed_m_s"] for s in some], [s["needs_n"] for s in some],
                                  [s["has_n"] for s in some])
@@ -318,5 +321,5 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     out = {"format": FORMAT, "asked": {k: x for k, x in asked.items() if k != "line_found"}, "plan": plan,
            "conditions": rows, "load_cases": cases, "ramp": ramp, "design": design, "assumed": ranges, "band": band,
            "vessel": vessel, "line": line, "speeds": by_speed,
-           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t), "cost": cost, **more}
+           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t, top), "cost": cost, **more}
     return out | {"sentence": sentence(out)}

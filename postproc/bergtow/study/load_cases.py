@@ -271,13 +271,16 @@ def inside(case, place, margin):
 
 
 def course_change(t, runs, degrees, radius):
-    """Through a bend. On a line the towing end leads by its length, so that the bend begins as far ahead, and the
-    tension holds the body in the bend, too; a body whose speed is prescribed is held across by no series."""
+    """Through a bend. On a line the towing end leads by its length, and a vessel looks ahead, so that the bend begins
+    as far ahead, and the tension holds the body in the bend, too; a body whose speed is prescribed is held across by no
+    series."""
     if t.case.get("tow.waypoints", "none") != "none" or t.case.get("tow.programme", "none") != "none":
         return none("course_change", "case_has_path")
     r = radius or BEND_WIDTHS * t.width
     on_line = t.case.get("tow.mode") != "speed"
     ahead = case_value(t.case, "tow.hull_x", 0.0) + case_value(t.case, "tow.line_length", 0.0) if on_line else 0.0
+    if t.case.get("tow.mode") == "thrust":
+        ahead += case_value(t.case, "tow.vessel.lookahead", 0.0)
     tension = on_line and t.case.get("tow.line.branches", "1") == "1"
     angle, settle = math.radians(degrees), SETTLE / t.slower
     x, y = (float(t.case[f"body.{k}"].split()[0]) for k in "xy")

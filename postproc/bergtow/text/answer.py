@@ -80,8 +80,12 @@ def _over(a):
     return f"as a mean over {short(scale, 2)} s"
 
 
-def _in_case(v):
-    return "" if v["case"] == "case.steady" else f" in the load case \"{CASES[v['case']]}\""
+def _in_case(v, a):
+    """Of which load case a value is, and of which condition, where there are several of that speed."""
+    case = "" if v["case"] == "case.steady" else f" in the load case \"{CASES[v['case']]}\""
+    of = next((c.get("of") for c in a["load_cases"] if c.get("of")), None)
+    here = [c for c in a["conditions"] if c["speed_m_s"] == a["asked"]["speed_m_s"] or c["id"] == of]
+    return case + "".join(f" ({c['label']})" for c in here if c["id"] == of and len(here) > 1)
 
 
 def _needs(v, a):
@@ -89,11 +93,11 @@ def _needs(v, a):
     exceeded = f", which {percent(a['asked']['probability'])} of tows of {short(a['asked']['tow_hours'], 2)} h exceed" \
         if v["kind"] == "return_level" else ""
     return (f"The tow needs {force(v['n'])}{f' (95 % interval over fields: {interval} kN)' if interval else ''} "
-            f"{_over(a)}{_in_case(v)}{exceeded}")
+            f"{_over(a)}{_in_case(v, a)}{exceeded}")
 
 
 def _largest(v, a):
-    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v)}"
+    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}"
 
 
 def _covers(v, a):
@@ -106,7 +110,7 @@ def _covers(v, a):
 
 
 def _at_least(v, a):
-    return f"The tow needs at least {force(v['n'])} {_over(a)}{_in_case(v)}, since {REASONS[v['reason']]}"
+    return f"The tow needs at least {force(v['n'])} {_over(a)}{_in_case(v, a)}, since {REASONS[v['reason']]}"
 
 
 def _band(v, a):
