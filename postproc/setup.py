@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What pyproject.toml cannot say: a wheel made in the sources brings libbergtow and the program, of one process (MPI=no).
+"""What pyproject.toml cannot say: a wheel made in the sources brings libbergtow and the program, of one process.
 
 Elsewhere, as in an installed prefix, or where BERGTOW_LIB names the library to be used, it is the package alone. The
 wheel is of no version of Python: the library is loaded by ctypes.
