@@ -427,7 +427,8 @@ def bend(**case):
     def make(name, sets, fields):
         made.update(sets)
         return "run_failed"
-    at = {"body.x": "-1000 m", "body.y": "0 m", "domain.x0": "-1500 m", "domain.y0": "-500 m", "domain.length": "3000 m",
+    at = {"body.x": "-1000 m", "body.y": "0 m", "domain.x0": "-1500 m", "domain.y0": "-500 m",
+          "domain.length": "3000 m",
           "domain.width": "1000 m", "domain.ends": "open", "domain.sides": "wall", "tow.mode": "speed"} | case
     t = tow(case=at, speed=0.5, distance=3000.0, width=40.0, slower=1.0, case_ramp=100.0, direction=0.0)
     row = load_cases.course_change(t, SimpleNamespace(make=make, few=range(2)), 30.0, 400.0)
@@ -435,8 +436,8 @@ def bend(**case):
 
 
 def test_where_a_bend_lies():
-    """The corner of a prescribed body is a tangent beyond ramp and settling; on a line it is that of the towing end, and
-    a vessel turns as far before as it looks. A bend that leads into a wall is refused. Red: no line; no walls."""
+    """The corner of a prescribed body is a tangent beyond ramp and settling; on a line it is that of the towing end,
+    and a vessel turns as far before as it looks. A bend that leads into a wall is refused. Red: no line; no walls."""
     tangent = 400 * math.tan(math.radians(15))
     row, x = bend()
     assert row["reason"] == "run_failed" and x == pytest.approx(-1000 + 0.5 * (50 + 300) + tangent)

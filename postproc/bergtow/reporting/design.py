@@ -329,7 +329,8 @@ def answer_of(work, a, plan, began):
         cases, ramp, ranges, count = beside(work, a, row, t, left)
     now = time.monotonic()
     asked = {"concentrations": sorted({round(r["concentration"], 6) for r in rows}), "speed_m_s": asked_speed,
-             "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "thicknesses_m": a.thicknesses, "winds_m_s": a.winds, "vessel": a.vessel, "line": a.line,
+             "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "thicknesses_m": a.thicknesses,
+             "winds_m_s": a.winds, "vessel": a.vessel, "line": a.line,
              "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
              "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
@@ -371,7 +372,8 @@ def options(p):
                    "where an earlier one ended")
     p.add_argument("--budget", type=minutes, metavar="MIN",
                    help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
-    p.add_argument("--concentrations", type=several(concentration), metavar="A,...", help="of a case (default: its own)")
+    p.add_argument("--concentrations", type=several(concentration), metavar="A,...",
+                   help="of a case (default: its own)")
     p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
     p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="of a case: "

@@ -55,8 +55,8 @@ def force(text, option):
 def known(table, text, option, what):
     """A row of the library. Errors: BergtowError."""
     if text not in table:
-        raise BergtowError(f"{option} {text}: is no {what}, as \"110 t\" or \"1.1 MN\", and none of {', '.join(table)}; "
-                           f"name one of these, or add a table of your own with {option}s", USAGE)
+        raise BergtowError(f"{option} {text}: is no {what}, as \"110 t\" or \"1.1 MN\", and none of "
+                           f"{', '.join(table)}; name one of these, or add a table of your own with {option}s", USAGE)
     return table[text]
 
 

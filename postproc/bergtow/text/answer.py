@@ -20,7 +20,8 @@ KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at
          "constant": "does not vary", "none": "–"}
 #: what stands for the code of a reason
 REASONS = {
-    "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above", "no_window": "no window that is long enough", "no_member": "no run",
+    "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
+    "no_window": "no window that is long enough", "no_member": "no run",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
     "budget": "the budget was spent", "run_failed": "the run failed", "domain_too_short": "the domain is too short",
     "case_has_path": "the case has a path of its own: it is in the steady tow",
@@ -28,7 +29,8 @@ REASONS = {
     "environment_from_table": "the case has current or wind from a table",
     "line_not_known": "stiffness and length of the line are not known: give --line and --line-length",
     "line_length_not_known": "the length of the line is not known: give --line-length",
-    "line_stiffness_not_known": "the stiffness of the line is not known: name one of the library with --line", "single_line_tow_is_lost": "the tow is lost",
+    "line_stiffness_not_known": "the stiffness of the line is not known: name one of the library with --line",
+    "single_line_tow_is_lost": "the tow is lost",
     "value_not_above_mean": "the value is not above the mean", "no_ramp_held": "no ramp that was tried holds",
     "left_out": "left out"
 }
