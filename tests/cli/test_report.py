@@ -131,7 +131,7 @@ def text(driver, selector):
 @pytest.mark.slow
 class Drifting:
     """What Replay packs of a run whose floes all move, in ways that no packing makes small."""
-    n_frames, n_floes, n_pieces, towed, period, box = 61, 16000, 0, None, (0, 0), (0, 1e4, 0, 1e4)
+    n_frames, n_floes, n_pieces, towed, period, box = 61, 12000, 0, None, (0, 0), (0, 1e4, 0, 1e4)
     area = np.ones(n_floes)
     rng = np.random.default_rng(1)
 
@@ -152,7 +152,7 @@ def test_a_page_of_drifting_ice_can_be_mailed():
     made = replay_data.Replay.__new__(replay_data.Replay)
     made.run, made.compress = Drifting(), True
     frames, floes = made._fit(replay_data.LIMIT)
-    assert len(floes) == 16000 and 40 <= len(frames) < 61 and 8e6 < made.size < 10.2e6
+    assert len(floes) == 12000 and 40 <= len(frames) < 61 and 6e6 < made.size < 8.1e6
 
 
 def test_needs_nothing_but_itself(page, alone):

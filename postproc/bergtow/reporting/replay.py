@@ -21,9 +21,9 @@ from bergtow.plot import style
 from bergtow.plot.force import running_mean, smoothing
 from bergtow.plot.scene import Colouring, body_size, needs_window, tow_heading, tow_line, view_body
 
-#: bytes of the replay within the page, unless told otherwise: with the pictures of so much ice, 4 MB, a page of 15 MB,
-#: which can be mailed
-LIMIT = 10e6
+#: bytes of the replay within the page, unless told otherwise: with outlines and pictures of much ice, 6 MB, a page of
+#: 15 MB, which can be mailed
+LIMIT = 8e6
 RAW_LIMIT = 120e6       #: bytes unpacked, which a browser has to hold, and four times as much this program
 LEAST_FRAMES = 40      #: fewer are not worth a replay: rather are floes left out
 BUCKETS = 1500         #: points of a force curve
