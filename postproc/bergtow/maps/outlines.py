@@ -110,7 +110,8 @@ def options(p):
                    "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
     p.add_argument("--crs", help="coordinate reference system, if the file does not name it: EPSG:..., any other "
                    "name that PROJ knows, or local: metres east and north without a place on the earth")
-    p.add_argument("--layer", metavar="NAME", help="layer to read, if there are several; the grid of a NetCDF or HDF5 file")
+    p.add_argument("--layer", metavar="NAME",
+                   help="layer to read, if there are several; the grid of a NetCDF or HDF5 file")
     p.add_argument("--where", metavar="SQL", help="only features that meet this condition, e.g. \"kind = 'ice'\"")
     p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
                    "image the thickness by label: 1=0.5,2=1.2")
