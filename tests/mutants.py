@@ -923,8 +923,7 @@ MUTANTS = {
     ]),
     "src/route/no_go.c": ([PLAN + "the_gap_that_the_hull_fits_through",
                            "cli/test_route_planner.py"], [
-        ("if (d < 0) found |= BT_ROUTE_IN_NO_GO;", "if (d < -g->need) found |= BT_ROUTE_IN_NO_GO;",
-         "the centre may go where the hull may not"),
+        ("at[1] + u[1] * now) - g->need;", "at[1] + u[1] * now);", "the centre may go where the hull may not"),
         ("at[0] + u[0] * now, at[1] + u[1] * now) - g->need;", "at[0], at[1]) - g->need;",
          "polygons stay where the ice goes by"),
         ("if (inside) return true;", "", "inside is free"),
@@ -932,18 +931,19 @@ MUTANTS = {
     "src/route/swath.c": ([PLAN + "the_ice_of_a_bend_is_that_of_a_ring",
                            "cli/test_route_planner.py"], [
         ("bt_max(0, 1 - leg->turn * aside)", "1", "the inner side of an arc counts as the outer one"),
-        ("best.over == c.over && better", "better", "a speed above the force limit is taken"),
+        ("(best.over && !c.over) ||", "", "a speed above the force limit is kept"),
         ("const double wider = half > 0 ? sqrt(2 * half / bt_sin(2 * half)) : 1,", "const double wider = 1,",
          "chords in place of arcs"),
         ("d * bt_hypot(x, y) * (x * tx + y * ty)", "d * (x * x + y * y)", "drag of the water from every side"),
     ]),
     "src/route/ice.c": ([PLAN + "terms_of_the_force", "cli/test_route_planner.py"], [
-        ("bt_min(1, cap)", "1", "no cap by rafting"),
+        ("bt_min(packed, cap) - plough", "packed - plough", "no cap by rafting"),
         ("bt_max(0, sqrt(4 * area / BT_PI) / t->width - 1)", "0", "a wide floe counts as a narrow one"),
         ("(1 + t->added_mass) * v * v", "v * v", "the water that floes take along is left out"),
     ]),
     "src/route/plan.c": ([PLAN + "routes_are_a_width_apart", "cli/test_route_planner.py"], [
         ("kept = kept && apart(r, &plan->route[a]) > t->width;", "(void)apart;", "routes on top of each other"),
+        ("    if (w.n == 0) {", "    if (false) {", "no way-point where the search ends where it begins"),
         ("plan->route[b].cost < plan->route[b - 1].cost", "false", "routes in the order in which they are found"),
     ]),
 }

@@ -46,6 +46,7 @@ typedef enum {
     BT_ROUTE_START_TOO_THICK, ///< the ice at the start needs more than the force limit at every speed
     BT_ROUTE_GOAL_TOO_THICK,
     BT_ROUTE_GOAL_DRIFTS,    ///< the goal leaves faster, in the frame of the ice, than the berg follows
+    BT_ROUTE_AT_GOAL,        ///< the start is the goal
 } bt_route_status;
 
 /// What is wrong with a route: bits.

@@ -171,6 +171,10 @@ static bool into_route(const bt_planner *p, const bt_lattice_way *f, bool direct
         w.point[w.n][0] = f->point[k][0], w.point[w.n][1] = f->point[k][1];
         last = w.point[w.n++];
     }
+    if (w.n == 0) { // the search has ended where it began, less than a spacing from the goal
+        w.point[0][0] = t->start[0], w.point[0][1] = t->start[1];
+        w.n = 1;
+    }
     bt_way_price(p, &w);
     bt_way_goal(p, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
     bt_way_price(p, &w);
@@ -306,9 +310,12 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     plan->cell = p.ice.cell;
     plan->spacing = bt_lattice_spacing(l);
     plan->status = fault_of_end(&p, 0, t->start, 0, &plan->force);
-    if (!straight_line(&p, &plan->route[0])) {
+    double there[2];
+    bt_way_goal(&p, 0, t->start[0], t->start[1], there);
+    const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
+    if (at_goal || !straight_line(&p, &plan->route[0])) {
         plan->n = 0;
-        if (!plan->status) plan->status = BT_ROUTE_GOAL_DRIFTS;
+        if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
     }
     const bt_route *straight = &plan->route[0];
     double goal[4] = {0};

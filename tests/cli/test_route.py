@@ -540,6 +540,16 @@ def local(geometry):
     ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
     ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "no way leads from the start to the goal"),
     ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
+    ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached where the tow starts"),
+    ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached where the tow starts"),
+    ({}, ["--to", "nan,0"], USAGE, "--to: nan: "),
+    ({}, ["--to", "8.5,0", "--no-go", "empty.geojson"], CASE, "it holds none"),
+    ({}, ["--to", "8.5,0", "--no-go", "flat.geojson"], CASE, "polygon 2 has no area"),
+    ({}, ["--to", "8.5,0", "--no-go", "nan.geojson"], CASE, "polygon 1 has no ring of three finite positions"),
+    ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is no polygon"),
+    ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "no whole number from 1 to 16"),
+    ({}, ["--to", "8.5,0", "--replan", "10 s", "--speeds", "0.1,0.2"], USAGE, "one speed"),
+    ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),
     ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),
     ({}, ["--to", "8.5,0", "--map", "map.shp"], USAGE, "bergtow outlines"),
     ({}, ["--to", "8.5,0", "--speeds", "0"], USAGE, "is not above 0"),
@@ -552,7 +562,10 @@ def test_wrong_use_is_said(tmp_path, changes, words, code, said):
     near = np.array(LAND["coordinates"]) - [0.5, 0]
     barrier = [[[5, -9], [5.5, -9], [5.5, 9], [5, 9], [5, -9]]]
     files = {"land": local(LAND), "degrees": LAND, "near": local(LAND | {"coordinates": near.tolist()}),
-             "barrier": local(LAND | {"coordinates": barrier})}
+             "barrier": local(LAND | {"coordinates": barrier}), "empty": local(LAND) | {"features": []},
+             "nan": local(LAND | {"coordinates": [[[0, 0], [1, np.nan], [1, 1], [0, 0]]]}),
+             "flat": local(LAND | {"type": "MultiPolygon", "coordinates": [
+                 LAND["coordinates"], [[[0, 1], [1, 2], [2, 3], [0, 1]]]]}), "nowhere": local(None)}
     for name, what in files.items():
         (tmp_path / f"{name}.geojson").write_text(json.dumps(what))
     (tmp_path / "text.geojson").write_text("x")

@@ -12,7 +12,7 @@ bound.
 import dataclasses
 
 from bergtow import writing
-from bergtow.errors import CASE, IO, USAGE, RunError
+from bergtow.errors import CASE, IO, RunError
 from bergtow.result.run import Run
 from bergtow.routing import members, output, situation, tows, verdict
 from bergtow.study.runs import SPENT
@@ -146,11 +146,6 @@ def estimate(c, every, told, planning):
 def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
     """Tow with new looks, once planned, and straight, through the ice of the case; write and say what came out."""
     from bergtow.routing import route as command
-    if len(w["speeds"]) > 1:
-        raise RunError("--replan", "plans the way at one speed", "give --speeds one speed", USAGE)
-    if w["age"] > w["replan"]:
-        raise RunError("--map-age", "is longer than --replan", "take a map that is younger than the time between looks",
-                       USAGE)
     runs.members = [members.Member(situation.reading(s.values, s.field))]
     h = Horizon(a, w, s, goal, runs, files, found)
     perfect = w["errors"].none and not w["age"]

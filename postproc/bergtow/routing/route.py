@@ -53,6 +53,7 @@ STATUS = {
                        "choose another goal, or take a lower speed or a higher limit"),
     "no_route": ("bergtow route", "no way leads from the start to the goal",
                  "take a smaller --radius, --clearance or --width, or a higher --force-limit"),
+    "at_goal": ("--to", "the tow starts at its goal", "choose a goal elsewhere"),
     "goal_drifts_away": ("--to", "the goal drifts away from the ice faster than the body is towed",
                          "take a higher speed"),
 }
@@ -74,7 +75,7 @@ def options(p):
     p.add_argument("--objective", choices=tuple(words.UNITS), default="work", help="what is to be small (default work)")
     p.add_argument("--speeds", metavar="V,V", help="speeds to choose among (default: tow.speed)")
     p.add_argument("--force-limit", metavar="F", help="tow force or tension that is not to be exceeded")
-    p.add_argument("--routes", type=whole_from(1, 20), default=ROUTES, metavar="K", help="routes besides the straight "
+    p.add_argument("--routes", type=whole_from(1, 16), default=ROUTES, metavar="K", help="routes besides the straight "
                    f"line, at least a width apart (default {ROUTES})")
     p.add_argument("--members", type=whole_from(1, 1000), default=MEMBERS, metavar="N", help="members of the map that "
                    f"every route is towed through (default {MEMBERS}; a map without errors has one)")
@@ -116,6 +117,18 @@ def _not_below(text, unit, option):
     if not (np.isfinite(value) and value >= 0):
         raise RunError(f"{option} {text}", "is below 0", "give 0 or more", USAGE)
     return value
+
+
+def refuse_looks(a, w, s):
+    """Refuse what --replan cannot have. Errors: RunError."""
+    if s.mode == "thrust":
+        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
+                       "way would change its tow before the look", "set tow.mode to speed or line", USAGE)
+    if len(w["speeds"]) > 1:
+        raise RunError("--replan", "plans the way at one speed", "give --speeds one speed", USAGE)
+    if w["age"] > w["replan"]:
+        raise RunError("--map-age", "is longer than --replan", "take a map that is younger than the time between looks",
+                       USAGE)
 
 
 def wanted(a, s):
@@ -349,9 +362,11 @@ def perform(a):
     width = _above(a.width, "m", "--width") if a.width else None
     s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, width)
     w = wanted(a, s)
-    if w["replan"] and s.mode == "thrust":
-        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
-                       "way would change its tow before the look", "set tow.mode to speed or line", USAGE)
+    if tows.to_goal(np.array([s.start]), goal)[0] <= tows.ARRIVED * s.hull.width:
+        raise RunError(f"--to {a.to}", f"is reached where the tow starts: within a width of the body, "
+                       f"{s.hull.width:.4g} m", "choose a goal farther away", CASE)
+    if w["replan"]:
+        refuse_looks(a, w, s)
     last = began + 60 * a.budget
     runs = tows.Tows(case.resolve(), folder, "route", program, [], a.jobs, last, last)
     found = {"case": a.case.name, "title": s.values["run.title"] or a.case.stem, "status": "ok", "set": a.set,

@@ -69,8 +69,7 @@ def number(text, unit, option):
     try:
         _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
     except Exception as error:
-        raise RunError(option, str(error), "write metres of the case as X,Y, or degrees as 20.1E,76.5N",
-                       USAGE) from None
+        raise RunError(option, str(error), "see bergtow route --help", USAGE) from None
     return value.value
 
 
@@ -80,7 +79,7 @@ def position(text, place, option):
     if len(parts) != 2:
         raise RunError(f"{option} {text}", "is no position", "write it as X,Y in metres of the case, or as degrees, "
                        "20.1E,76.5N", USAGE)
-    sides = [part[-1:].upper() for part in parts]
+    sides = [part[-1:].upper() if part[-2:-1] in "0123456789. " else "" for part in parts]  # of nan the n is none
     if {*sides} & {*"NESW"}:
         if not ({*sides} & {*"EW"} and {*sides} & {*"NS"}):
             raise RunError(f"{option} {text}", "is no place on the earth", "write a longitude and a latitude, as in "
@@ -113,11 +112,19 @@ def no_go_file(path, place):
         found = json.loads(Path(path).read_text(encoding="utf-8"))
         features = found["features"] if found.get("type") == "FeatureCollection" else [found]
         geometries = [f.get("geometry", f) for f in features]
-        rings = [polygon[0] for g in geometries
-                 for polygon in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
-        if any(g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
+        if any(g is None or g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
             raise ValueError("a geometry is no polygon")
-        rings = [np.asarray(ring, dtype=float)[:, :2] for ring in rings]
+        polygons = [p for g in geometries for p in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
+        rings = []
+        for k, polygon in enumerate(polygons):
+            ring = np.array([[float(x) for x in point[:2]] for point in polygon[0]] if polygon else [])
+            if ring.shape[1:] != (2,) or len(ring) < 3 or not np.isfinite(ring).all():
+                raise ValueError(f"polygon {k + 1} has no ring of three finite positions or more")
+            if len(np.unique(ring, axis=0)) < 3 or np.linalg.matrix_rank(ring - ring[0], 1e-9 * np.ptp(ring)) < 2:
+                raise ValueError(f"polygon {k + 1} has no area")
+            rings.append(ring)
+        if not rings:
+            raise ValueError("it holds none")
         crs = found.get("crs", {}).get("properties", {}).get("name", "")
     except OSError as error:
         raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
