@@ -303,14 +303,21 @@ static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, 
 
 /// The cap and the length of the rounds, by what they bring.
 typedef struct {
-    double cap, mark; ///< mark: sum of squares at the last residual pass
+    double cap, mark; ///< mark: misfit at the last residual pass
     int length;
 } pace;
 
-static void adapt(pace *a, const bt_problem *p, double squares)
+/// The sum of squares or, where a cell's part is cut off (bt_rounds_scale) and the sum does not show a gain, the largest.
+static double misfit_of(const bt_problem *p, const bt_work *work)
 {
-    const bool gained = !(squares > GAIN * a->mark), first = isinf(a->mark);
-    a->mark = squares;
+    const double largest = work->residual * work->residual;
+    return largest * p->per_square > p->most_squares ? largest : work->squares;
+}
+
+static void adapt(pace *a, const bt_problem *p, double misfit)
+{
+    const bool gained = !(misfit > GAIN * a->mark), first = isinf(a->mark);
+    a->mark = misfit;
     if (first || (gained && a->cap == 1)) return;
     if (gained) {
         a->cap = bt_min(MOST_CAP, 1 - (1 - a->cap) / NARROWER);
@@ -365,7 +372,7 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
             // from where momentum came nearest
             if (a.cap > 0 && back_to_best(w, p, work, best)) settled = true, all = false;
             a.cap = 0, a.length = p->length;
-        } else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
+        } else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, misfit_of(p, work));
         const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
         if (part) keep_near_bad(w);
         settled = run_round(w, p, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
