@@ -109,8 +109,8 @@ def field(out, concentration, number):
         c = tows.candidate(name, name, route, SPEED, s)
         sets = [w for k, v in (c.keys | situation.reading(s.values, s.field.resolve()) |
                                {"output.frame_interval": "-1 s"}).items() for w in ("--set", f"{k}={v}")]
-        subprocess.run([program_path(), "run", path, "-o", folder / name, "--quiet", "--threads", "1", "--force", *sets],
-                       check=True)
+        subprocess.run([program_path(), "run", path, "-o", folder / name, "--quiet", "--threads", "1", "--force",
+                        *sets], check=True)
         with Run(folder / name) as run:
             found[name] = tows.outcome(run, c, goal, s) | {"kind": route.kind}
     write_json(found, file, True)

@@ -232,15 +232,15 @@ def test_the_ice_of_a_straight_swath_is_that_of_a_rectangle():
 
 
 def test_the_ice_of_a_bend_is_that_of_a_ring():
-    """An arc through ice everywhere: W times its length, and no more; and along the rim of ice. Red: outer and inner side
-    not told apart, which makes 3 % of the force."""
+    """An arc through ice everywhere: W times its length, and no more; and along the rim of ice. Red: outer and inner
+    side not told apart, which makes 3 % of the force."""
     found = plan(Ice([box(0, 0, 600, 600)], [1.0]), BERG, (100, 100), (400, 300), extent=(0, 0, 600, 600), radius=150,
                  start_heading=0, goal_heading=1.2, routes=1)
     r = found.routes[1]
     assert math.isclose(r.ice_area, 20 * r.length, rel_tol=1e-12) and len(r.waypoints) > 1
     # a quarter of a circle that is full of ice: of the inner side alone
-    found = plan(Ice([disc(100, 250, 150, 4096)], [1.0]), BERG, (100, 100), (250, 250), extent=(0, 0, 600, 600), radius=150, start_heading=0,
-                 goal_heading=math.pi / 2, routes=1, weights=PLOUGH, cell=1)
+    found = plan(Ice([disc(100, 250, 150, 4096)], [1.0]), BERG, (100, 100), (250, 250), extent=(0, 0, 600, 600),
+                 radius=150, start_heading=0, goal_heading=math.pi / 2, routes=1, weights=PLOUGH, cell=1)
     r = found.routes[1]
     inner = math.pi / 4 * (150 ** 2 - 140 ** 2)
     assert math.isclose(r.length, 75 * math.pi, rel_tol=1e-6)
