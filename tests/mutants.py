@@ -916,8 +916,7 @@ MUTANTS = {
                              PLAN + "a_maze_is_crossed_by_its_openings", "cli/test_route_planner.py"], [
         ("(1 - 1e-9) * l->per_step * steps)", "2 * l->per_step * steps)", "a bound above the cost"),
         ("if (bound < 0) continue;", "if (bound <= 0) continue;", "no way to the goal's own place"),
-        ("p->no_go.need - 0.708 * l->h;", "p->no_go.need + 0.708 * l->h;",
-         "squares that a corner leads through are shut"),
+        ("p->no_go.need - 0.708 * l->h;", "p->no_go.need + 0.708 * l->h;", "squares with a free corner are shut"),
         ("int64_t)ceil((factor * measure + turn) / s->unit);", "int64_t)ceil(measure / s->unit);",
          "routes found before do not repel"),
         ("a < cut - 1e-9 * l->h || b < cut - 1e-9 * l->h ||", "", "turns that their arcs do not fit into"),

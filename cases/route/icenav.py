@@ -110,8 +110,7 @@ def field(out, concentration, number):
         sets = [w for k, v in (c.keys | situation.reading(s.values, s.field.resolve()) |
                                {"output.frame_interval": "-1 s"}).items() for w in ("--set", f"{k}={v}")]
         subprocess.run([program_path(), "run", path, "-o", folder / name, "--quiet", "--threads", "1", "--force",
-                        *sets],
-                       check=True)
+                        *sets], check=True)
         with Run(folder / name) as run:
             found[name] = tows.outcome(run, c, goal, s) | {"kind": route.kind}
     write_json(found, file, True)

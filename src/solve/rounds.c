@@ -307,7 +307,7 @@ typedef struct {
     int length;
 } pace;
 
-/// The sum of squares or, where a cell's part is cut off (bt_rounds_scale) and the sum does not show a gain, the largest.
+/// The sum of squares, or the largest where the part of a cell is cut off (bt_rounds_scale): that sum shows no gain.
 static double misfit_of(const bt_problem *p, const bt_work *work)
 {
     const double largest = work->residual * work->residual;

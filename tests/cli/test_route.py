@@ -408,14 +408,13 @@ def test_a_new_look_leaves_the_way_so_far(tmp_path):
 
 
 #: a small berg on a line; a shoal on the straight way
-LINE = {"run": {"dt": 4, "duration": 800}, "domain": {"frame": "geographic", "length": 560, "width": 360, "x0": 0,
+LINE = {"run": {"dt": 4, "duration": 800}, "domain": {"frame": "geographic", "length": 560, "width": 480, "x0": 0,
                                                       "ends": "open", "sides": "open"},
         "ice": {"concentration": 0.35, "size": 25, "thickness": 0.6, "seed": 3},
         "body": {"length": 40, "draft": 25, "x": 90, "y": 0},
         "tow": {"mode": "line", "speed": 0.5, "line_length": 60, "line_stiffness": "20 MN", "ramp": 100}}
 LOOKS = ("--to", "400,0", "--clearance", "15 m", "--routes", "1", "--replan", "150 s", "--map-age", "50 s",
-         "--map-error", "4 m", "--members",
-         "2", "--no-go", "shoal.geojson")
+         "--map-error", "4 m", "--members", "2", "--no-go", "shoal.geojson")
 
 
 def towed_on_a_line(folder):

@@ -233,8 +233,7 @@ def test_the_ice_of_a_straight_swath_is_that_of_a_rectangle():
 
 def test_the_ice_of_a_bend_is_that_of_a_ring():
     """An arc through ice everywhere: W times its length, and no more; and along the rim of ice. Red: outer and inner
-    side
-    not told apart, which makes 3 % of the force."""
+    side not told apart, which makes 3 % of the force."""
     found = plan(Ice([box(0, 0, 600, 600)], [1.0]), BERG, (100, 100), (400, 300), extent=(0, 0, 600, 600), radius=150,
                  start_heading=0, goal_heading=1.2, routes=1)
     r = found.routes[1]
