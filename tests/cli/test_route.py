@@ -413,14 +413,14 @@ LINE = {"run": {"dt": 4, "duration": 800}, "domain": {"frame": "geographic", "le
         "ice": {"concentration": 0.35, "size": 25, "thickness": 0.6, "seed": 3},
         "body": {"length": 40, "draft": 25, "x": 90, "y": 0},
         "tow": {"mode": "line", "speed": 0.5, "line_length": 60, "line_stiffness": "20 MN", "ramp": 100}}
-LOOKS = ("--to", "400,0", "--clearance", "15 m", "--routes", "1", "--replan", "150 s", "--map-age", "50 s",
+LOOKS = ("--to", "400,0", "--clearance", "12 m", "--routes", "1", "--replan", "150 s", "--map-age", "50 s",
          "--map-error", "4 m", "--members", "2", "--no-go", "shoal.geojson")
 
 
 def towed_on_a_line(folder):
     folder.mkdir()
     write_case(folder, LINE)
-    shoal = {"type": "Polygon", "coordinates": [[[-60, 250], [10, 250], [10, 270], [-60, 270], [-60, 250]]]}
+    shoal = {"type": "Polygon", "coordinates": [[[-60, 250], [-5, 250], [-5, 270], [-60, 270], [-60, 250]]]}
     (folder / "shoal.geojson").write_text(json.dumps(local(shoal)))
     return folder
 

@@ -109,7 +109,8 @@ class Horizon:
         return self.speed * (time - ramp / 2 if time > ramp else time ** 2 / (2 * ramp) if ramp > 0 else time)
 
     def look(self, k, time, points):
-        """(ice, start, heading, decided points) at a look; None once the goal is reached or the line has parted."""
+        """(ice, start, heading, decided points, all points) at a look; None once the goal is reached or the line has
+        parted. All points are those that the tow goes by: where no new plan is allowed, they stay."""
         s = self.s
         points, last = with_point(points, self.way(time))
         decided, tangent = points[:last + 1], points[last] - points[last - 1]
@@ -131,7 +132,7 @@ class Horizon:
                 line = decided[-1] - body
                 heading = np.arctan2(*line[::-1])
                 start = decided[-1] - s.line * line / np.hypot(*line)
-        return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided
+        return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided, points
 
 
 def estimate(c, every, told, planning):
@@ -174,7 +175,7 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
         there = h.look(k, time, points)
         if there is None:
             break
-        ice, start, heading, decided = there
+        ice, start, heading, decided, points = there
         new = command.planned(a, w, s, goal, weights, factor, ice=ice, start=start, start_heading=heading)
         route = best(new, heading, a.headings)
         if route:
