@@ -53,7 +53,7 @@ double bt_cost_floe_step(const bt_case *c, double concentration)
 
 // Of any step; of an entry of the series, with its share of the flushes; of a frame, and of a floe in it; of the start,
 // s.
-static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 6e-6, START = 0.1;
+static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 1.6e-6, START = 0.1;
 // Of a convex part of a floe, and of a pair of parts of two floes that are near each other, each step, s.
 static const double PART = 0.05e-6, PAIR = 6e-9;
 

@@ -33,9 +33,9 @@ typedef struct bt_cost_ice {
 double bt_cost_making(const bt_case *c, double floes);
 
 /// Processor time of the steps of a run and of what they leave, s: 8 µs a step, bt_cost_floe_step a floe, 17 µs an
-/// entry of the series, 1 ms and 6 µs a floe a frame, which is packed; 0.1 s to start and to end; of floes that are not
-/// convex 0.05 µs a part, and the pairs of parts of two floes, of which a floe has more neighbours the denser the ice
-/// is. Measured on runs of 1 to 260,000 steps, and on outlines of 12 to 120 corners in 3 to 80 parts.
+/// entry of the series, 1 ms and 1.6 µs a floe a frame, which is packed; 0.1 s to start and to end; of floes that are
+/// not convex 0.05 µs a part, and the pairs of parts of two floes, of which a floe has more neighbours the denser the
+/// ice is. Measured on runs of 1 to 260,000 steps, and on outlines of 12 to 120 corners in 3 to 80 parts.
 double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice);
 
 /// Both, of a case whose ice is made or given by hand.

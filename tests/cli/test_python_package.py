@@ -114,7 +114,7 @@ def test_values_of_other_types(tmp_path):
         bergtow.Simulation(SHORT | {"ice": {"field": tmp_path / "none.h5"}})
     with pytest.raises(TypeError, match="is nothing that a case can hold"):
         bergtow.Case(changed(SHORT, tow__speed=object()))
-    with bergtow.Simulation(SHORT) as sim, pytest.raises(IndexError, match="body -1: there is none"):
+    with bergtow.Simulation(SHORT) as sim, pytest.raises(IndexError, match="body -1: does not exist"):
         sim.outline(-1)
 
 

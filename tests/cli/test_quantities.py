@@ -153,7 +153,8 @@ def test_every_number_of_the_summary_is_listed(left):
                                                                      }.items() and e["label"] in said
     assert all(k["description"] and (k["units"] or not k["number"]) for k in quantities["summary"])
     assert {k["name"].split(".")[0] for k in quantities["summary"] if k["machine"]} == {
-        "wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "threads", "divisions", "moved_floes", "imbalance",
+        "wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "threads", "divisions", "undivided_steps",
+        "moved_floes", "imbalance",
         "worst_imbalance", "repartition_imbalance", "worst_repartition_imbalance", "edge_cut", "halo_share",
         "memory_per_floe_b", "sweep_bytes_per_contact", "call_s", "shared_s"
     }

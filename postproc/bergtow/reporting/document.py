@@ -10,8 +10,8 @@ from bergtow.text import loads as loads_text
 
 #: what has been held against observations: case, what was observed, verdict; cases/validation/README.md has it in full
 EVIDENCE = (
-    ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, against what was "
-     "observed; above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
+    ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, contrary to the "
+     "observations; above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
     ("cover on a barrier", "the form and 1/friction hold; the length scale grows more slowly than the width in "
      "channels of 5 to 15 floes"),
     ("ship model in floes", "none: a prediction"))
