@@ -14,7 +14,7 @@ static inline void detect_all(bt_world *w, double margin)
     bt_cells_wake_all(w->cells);
     // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
     for (bt_idx k = 0; k < w->cells->n; k++)
-        w->cells->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
+        w->cells->bound[k] = bt_max(0.4 * margin / w->par.dt, 1e-300);
     bool movable = false;
     for (bt_idx l = w->cells->n_in_cells; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
     if (!movable) w->cells->bound[w->cells->n - 1] = 0;

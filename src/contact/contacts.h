@@ -10,7 +10,8 @@
 // (tests/unit/test_contacts.c holds them against all pairs by brute force).
 //
 // Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame,
-// rounded up to a power of √2; at least the slop, at most 16 mean floe sizes (space/cells.h).
+// with a fifth more for what contacts add to its speed, rounded up to a power of √2; at least the slop, at most 16 mean
+// floe sizes (space/cells.h).
 #ifndef BT_CONTACTS_H
 #define BT_CONTACTS_H
 

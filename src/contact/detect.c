@@ -124,6 +124,9 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
 
 // --- detection -------------------------------------------------------------------------------------------------------
 
+/// A speed whose margin is the slop, for bodies that may lie deeper than that at rest.
+static double stir(const bt_world *w) { return 0.4 * w->par.slop / w->par.dt; }
+
 /// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
@@ -155,7 +158,7 @@ static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
     bool movable = false;
     for (bt_idx l = t->n_in_cells; l < b->n; l++) {
         double s = bt_max(bt_bodies_speed(w, l, &v[l]), bt_bodies_speed(w, l, &v2[l]));
-        if (b->disturbed[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
+        if (b->disturbed[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, stir(w));
         movable = movable || b->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
         fastest = bt_max(fastest, s);
@@ -171,7 +174,7 @@ static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals 
     (void)none;
     bt_cells *t = w->cells;
     const bt_vel *const *v = velocities;
-    const double stir = 0.5 * w->par.slop / w->par.dt;
+    const double least = stir(w);
     double s = 0;
     if (k == t->n - 1) return;
     const bt_idx end = bt_cells_moves(t, k) ? t->cell[k].end : t->cell[k].first;
@@ -179,7 +182,7 @@ static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals 
         // most floes of a cell that moves rest
         if (!bt_bodies_drift(w, &v[0][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[0][i]));
         if (v[1] != v[0] && !bt_bodies_drift(w, &v[1][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[1][i]));
-        if (w->bodies.disturbed[i]) s = bt_max(s, stir);
+        if (w->bodies.disturbed[i]) s = bt_max(s, least);
     }
     t->speed[k] = s;
 }
@@ -224,9 +227,8 @@ bool bt_contacts_outrun(const bt_world *w)
     for (bt_idx j = 0; j < t->n_busy && any == 0; j++) {
         const bt_idx k = t->busy[j];
         const bt_cell *cell = &t->cell[k];
-        any = cell->own && t->bound[k] > 0 &&
-              (!cell->active || bt_margin_for(w, t->bound[k]) > cell->margin ||
-               2 * w->par.dt * t->bound[k] > bt_margin_most(w));
+        any = cell->own && t->bound[k] > 0 && (!cell->active || !bt_margin_holds(w, cell->margin, t->bound[k]) ||
+                                               2 * w->par.dt * t->bound[k] > bt_margin_most(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;
@@ -307,7 +309,10 @@ static void narrow_phase(bt_world *w, bt_idx k, const void *scratch, bt_totals *
         s->pack.n++;
         several = several || p->part[0] || p->part[1] || bt_shore_holds(w, p->a) || bt_shore_holds(w, p->b);
     }
-    if (several) merge(w, t, &s->pack);
+    if (several) {
+        merge(w, t, &s->pack);
+        t->news = BT_NEW_CONTACTS; // a contact may have given way to one that is farther off
+    }
     if (t->laws.n_memory > 0) replace(w, t, &s->pack);
     bt_pack_contacts(w, k, &s->pack);
 }
@@ -353,6 +358,7 @@ void bt_contacts_detect(bt_world *w, bool again)
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
         bt_cell *cell = &t->cell[k];
+        cell->news = BT_SAME_CONTACTS;
         if (!cell->own) continue;
         const bool active = t->bound[k] > 0;
         if (!active) {
@@ -360,10 +366,10 @@ void bt_contacts_detect(bt_world *w, bool again)
             cell->active = false;
             continue;
         }
-        const double margin = bt_margin_for(w, t->bound[k]);
-        if (again && cell->active && margin <= cell->margin) continue;
+        if (again && cell->active && bt_margin_holds(w, cell->margin, t->bound[k])) continue;
         cell->active = true;
-        cell->margin = margin;
+        cell->margin = bt_margin_for(w, t->bound[k]);
+        cell->news = again ? BT_MORE_CONTACTS : BT_NEW_CONTACTS;
         due[n_due++] = k;
     }
     // within a team of the caller the pass is that one thread's, which keeps its number

@@ -395,6 +395,31 @@ static bool warm_start(bt_world *w)
     return pressed > 0;
 }
 
+static void residual_of_more(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    bt_cell *cell = &w->cells->cell[k];
+    if (cell->news == BT_SAME_CONTACTS) return;
+    start_impulses(cell, w->bodies.inv);
+    residual_of_cell(w, k, context, t);
+    t->most = bt_max(t->most, cell->news == BT_MORE_CONTACTS ? cell->work.found.most : INFINITY);
+    bt_sum_add(&t->sum[0], cell->n_contacts);
+}
+
+/// Does the solution at hand hold with the contacts that have been added to it? They bear no load, so that it has the
+/// velocities of all impulses still, and the residual elsewhere is as it was.
+static bool holds_with_more(bt_world *w)
+{
+    bt_step_stats *st = &w->stats;
+    const bt_problem p = contact_problem(w);
+    bt_totals t = {.n_sums = 1};
+    bt_phases_any_order(w, residual_of_more, &p, &t);
+    bt_domain_reduce(w, &t);
+    st->residual_checks += (int64_t)bt_sum_value(&t.sum[0]);
+    if (!(t.most <= p.tolerance)) return false;
+    st->residual = bt_max(st->residual, t.most);
+    return true;
+}
+
 static void sweep_to_tolerance(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
@@ -420,6 +445,7 @@ static void sweep_to_tolerance(bt_world *w)
 static void solve(bt_world *w)
 {
     bt_solver *s = w->solver;
+    if (s->extends && holds_with_more(w)) return;
     s->rebounds = bt_restitution_begin(w);
     for (;;) {
         sweep_to_tolerance(w);
@@ -430,9 +456,10 @@ static void solve(bt_world *w)
     }
 }
 
-void bt_solver_solve(bt_world *w)
+void bt_solver_solve(bt_world *w, bool extends)
 {
     bt_solver *s = w->solver;
+    s->extends = extends && !s->rebounds && !w->par.plain_sweeps;
     bt_step_stats *st = &w->stats;
     st->restitution_cut = false;
     // the displacements of the last step are over, and their array is of the bodies that were here then

@@ -79,6 +79,7 @@ typedef struct bt_solver {
     bt_kept_rows *kept;          ///< [n_kept] in any order
     bt_idx n_kept, cap_kept;
     bool rebounds;               ///< some contact of this step has a restitution
+    bool extends;                ///< the solution of this step at hand may hold with the contacts that were added
     struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
 } bt_solver;
 
@@ -89,8 +90,9 @@ void bt_solver_free(bt_solver *s);
 /// contacts get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
-/// halved, and again, at last with none, where the work is never positive.
-void bt_solver_solve(bt_world *w);
+/// halved, and again, at last with none, where the work is never positive. `extends`: vel is a solution of this step
+/// before its last detection, which stays where the contacts that were added allow it.
+void bt_solver_solve(bt_world *w, bool extends);
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
 void bt_solver_rest(bt_world *w);

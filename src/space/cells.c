@@ -13,14 +13,27 @@
 
 double bt_margin_most(const bt_world *w) { return 16 * w->par.size; }
 
-double bt_margin_for(const bt_world *w, double s)
+// Contacts make floes faster within the step. With a fifth more than the speeds before the solve, the margin holds for
+// the solution nearly wherever that matters: of 300 steps of full-scale tows in 80 and 90 % ice, 6 and 8 take sweeps
+// again instead of 105 and 181, and the updates are a sixth fewer. Two fifths save no more and add a tenth to the time
+// of detection. Plain sweeps, the reference, have no such room: fields are shaken with them, and keep their bits.
+#define FASTER 1.2
+
+/// The way, m, rounded up to a power of √2, between the slop and the largest margin.
+static double round_up(const bt_world *w, double least)
 {
-    const double least = 2 * w->par.dt * s;
     if (!(least < bt_margin_most(w)) && w->par.size > 0) return bt_margin_most(w);
     if (!(least > w->par.slop)) return w->par.slop;
     const int k = bt_ceil_2log2(least); // 2^(k/2)
     return ldexp(k & 1 ? 0.70710678118654752440 : 1, (k + (k & 1)) / 2);
 }
+
+double bt_margin_for(const bt_world *w, double s)
+{
+    return round_up(w, (w->par.plain_sweeps ? 1 : FASTER) * (2 * w->par.dt * s));
+}
+
+bool bt_margin_holds(const bt_world *w, double margin, double s) { return round_up(w, 2 * w->par.dt * s) <= margin; }
 
 // --- the cells -------------------------------------------------------------------------------------------------------
 

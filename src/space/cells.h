@@ -50,9 +50,12 @@
 /// that flies apart must not ask for cells, and pair lists, of the whole field.
 double bt_margin_most(const bt_world *w);
 
-/// Margin for speed s: 2 Δt s, rounded up to a power of √2 so that pair lists stay valid while speeds wander; at least
-/// the slop. m
+/// Margin for bodies whose speed is s before contacts are solved: 2 Δt s and a fifth more, rounded up to a power of √2
+/// so that pair lists stay valid while speeds wander; at least the slop. m
 double bt_margin_for(const bt_world *w, double s);
+
+/// Is a margin enough for a solution of speed s?
+bool bt_margin_holds(const bt_world *w, double margin, double s);
 
 /// the fifth phase is the cell of the large movable bodies
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
@@ -174,6 +177,9 @@ typedef struct bt_cell {
     bool border;                    ///< some body of its block is held by other ranks too
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
+    /// What the last detection made of them: those of the detection before it in this step; these and maybe more, which
+    /// bear no load yet; or others
+    enum { BT_SAME_CONTACTS, BT_MORE_CONTACTS, BT_NEW_CONTACTS } news;
     double margin;                  ///< m, of this step's detection
     bt_pair_search search;
     // contacts of this step

@@ -226,7 +226,7 @@ static void solve_contacts(bt_world *w)
     for (int round = 0;;) {
         if (round == 0) bt_contacts_detect(w, again); // gaps and J at X1
         clock_phase(w, &st->phases.detect, &t0);
-        bt_solver_solve(w); // U2 = U* + M̃⁻¹ Jᵀ λ
+        bt_solver_solve(w, again && round == 0); // U2 = U* + M̃⁻¹ Jᵀ λ
         sweeps += st->sweeps;
         updates += st->contact_updates;
         moves += st->contact_moves;
