@@ -440,7 +440,7 @@ bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
     bt_case_tow_course(&k);
     follow(&k);
     bt_case_tow_follow(&k);
-    bt_status loaded = bt_case_load_tables(c, err);
+    bt_status loaded = bt_case_read_flow_tables(c, err);
     size_t at_files = err->n;
     check_at_sea(&k, by_hand);
     check_run(&k);

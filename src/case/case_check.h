@@ -35,7 +35,7 @@ void bt_case_fill_impact(bt_case *c);
 char *bt_case_named_file(const char *from, const char *file);
 
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.
-bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
+bt_status bt_case_read_flow_tables(bt_case *c, bt_errors *err);
 
 /// Do the tables cover the run?
 void bt_case_check_tables(const bt_check *k);

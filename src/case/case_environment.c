@@ -13,7 +13,7 @@
 #include "base/elementary.h"
 #include "base/table.h"
 
-bt_status bt_case_load_tables(bt_case *c, bt_errors *err)
+bt_status bt_case_read_flow_tables(bt_case *c, bt_errors *err)
 {
     // Those that are there have been kept (bt_case_read_kept).
     const bt_status water = c->water.current_table && c->water.table.n == 0
