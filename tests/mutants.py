@@ -229,9 +229,9 @@ MUTANTS = {
         ("        u->mu *= BT_LOCKED_STICKS;\n", "", "loads of the proof go to the rim of their cones"),
         ("if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu", "if (!held) u->mu",
          "friction of contacts that slide holds"),
-        ("    if (held) keep_near(w, s, &l);", "    if (held && false) keep_near(w, s, &l);",
+        ("    if (held) drop_islands_moved(w, s, &l);", "    if (held && false) drop_islands_moved(w, s, &l);",
          "loads of the proof need not be those of the sweeps"),
-        ("    keep_above(w, s, w->par.tolerance);\n", "", "what passes for rest is locked"),
+        ("    drop_islands_below(w, s, w->par.tolerance);\n", "", "what passes for rest is locked"),
     ]),
     "src/solve/project.c": (PROJECT, [
         ("g->gap[i] += w->par.dt * ", "if (w->par.dt < 0) g->gap[i] += w->par.dt * ", "overlap of the start"),

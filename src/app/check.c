@@ -13,7 +13,7 @@
 #include "base/units.h"
 #include "case/arch.h"
 #include "case/case_check.h"
-#include "case/case_idle.h"
+#include "case/constraints.h"
 #include "case/case_tow.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"

@@ -9,7 +9,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
-#include "case/case_idle.h"
+#include "case/constraints.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"
@@ -105,19 +105,83 @@ static void follow(const check *k)
     follow_files(k);
 }
 
+// ---- defaults of the frames ----
+
+// Defaults that the frame of a case decides on.
+//
+// A row of the table of keys says with at_sea that its default is a model basin's. In the geographic frame such a
+// number would look like an answer: there it is none until the case gives it, or another key does (a programme the
+// speed, a named line its stiffness). Where it is then still none and has an effect, the case is refused. Other
+// defaults hold in both frames, or follow from the scene in the geographic one (case_fill.c, case_tow.c).
+
+static double *number(bt_case *c, const bt_key *k) { return (double *)(void *)((char *)c + k->offset); }
+
+static bool is_basin(const bt_case *c) { return c->domain.frame == BT_FRAME_BASIN; }
+
+/// May the run use the value of this key?
+static bool is_used(const bt_case *c, const char *key, bool by_hand)
+{
+    if (bt_case_is_unused(c, key)) return false;
+    if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(c) || by_hand || c->ice.outlines;
+    if (!strcmp(key, "tow.speed")) return c->body.shape != BT_BODY_ABSENT && c->tow.mode != BT_TOW_NONE;
+    return true;
+}
+
+/// Numbers that nobody gave, that have an effect, and whose default is a model basin's, become NaN. by_hand: there are
+/// floes of the list without a thickness of their own.
+static void clear_at_sea(const bt_check *k, bool by_hand)
+{
+    if (!k->from || is_basin(k->c)) return;
+    for (int i = 0; i < bt_n_case_keys; i++) {
+        const bt_key *row = &bt_case_keys[i];
+        if (!row->at_sea || row->type != BT_KEY_REAL || bt_check_given(k, row->name)) continue;
+        if (is_used(k->c, row->name, by_hand)) *number(k->c, row) = NAN;
+    }
+}
+
+static bool is_missing(const bt_check *k, const bt_key *row)
+{
+    if (row->type == BT_KEY_REAL) return isnan(*number(k->c, row));
+    return k->from && !is_basin(k->c) && !bt_check_given(k, row->name);
+}
+
+/// geojson.c asks for a thickness where outlines lack one.
+static bool may_miss(const bt_case *c, const char *key, bool by_hand)
+{
+    return !strcmp(key, "ice.thickness") && c->ice.outlines && !by_hand;
+}
+
+/// Refuse a case that lacks such a value once others have followed from what it gives. ice.thickness beside outlines
+/// may stay NaN: the file says whether it is needed.
+static void check_at_sea(const bt_check *k, bool by_hand)
+{
+    bt_case *c = k->c;
+    if (!bt_check_sound(k, "domain.frame")) return;
+    for (int i = 0; i < bt_n_case_keys; i++) {
+        const bt_key *row = &bt_case_keys[i];
+        if (!row->at_sea || !bt_check_sound(k, row->name) || !is_missing(k, row)) continue;
+        if (!is_used(c, row->name, by_hand)) { // a number without effect that is given as none
+            bt_schema_preset(row, row->type == BT_KEY_REAL, c);
+            continue;
+        }
+        if (may_miss(c, row->name, by_hand)) continue;
+        if (is_basin(c)) bt_check_fault(k, row->name, "is none where a value is needed; give it (%s)", row->at_sea);
+        else
+            bt_check_fault(k, row->name,
+                           "missing, and in domain.frame: geographic it has no default (that would be a model "
+                           "basin's); add it (%s)",
+                           row->at_sea);
+        if (k->from) k->from[i].faulty = true;
+    }
+}
+
 // ---- checks ----
 
 static void check_run(const check *k)
 {
     const bt_case *c = k->c;
     if (!bt_check_sound(k, "run.dt run.duration")) return;
-    // A case built in memory can leave the two keys without default unset.
-    if (!(c->run.dt > 0)) bt_check_fault(k, "run.dt", "is not set; give a time step, as in 0.1 s");
-    if (!(c->run.duration > 0)) bt_check_fault(k, "run.duration", "is not set; give a time, as in 450 s");
     if (!(c->run.dt > 0) || !(c->run.duration > 0)) return;
-    if (c->run.dt > c->run.duration)
-        bt_check_fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run",
-                       c->run.dt, c->run.duration);
     double steps = (double)bt_case_steps(c);
     if (steps > BT_MOST_STEPS)
         bt_check_fault(k, "run.dt",
@@ -126,19 +190,13 @@ static void check_run(const check *k)
     if (bt_check_sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
         bt_check_fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it",
                        c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
-    if (bt_check_sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
-        bt_check_fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time",
-                       c->output.window_start, c->run.duration);
 }
 
 static void check_closing(const check *k, const char *key, const char *boundary_key, double closing, bt_bound boundary,
                           double extent)
 {
-    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, boundary_key)) return;
-    if (boundary != BT_BOUND_WALL) {
-        bt_check_fault(k, key, "%g m/s needs a wall to move; set %s: wall, or remove the key", closing, boundary_key);
+    if (closing == 0 || boundary != BT_BOUND_WALL || !bt_check_sound(k, key) || !bt_check_sound(k, boundary_key))
         return;
-    }
     if (bt_check_sound(k, "run.duration domain.length domain.width") && 2 * closing * k->c->run.duration >= extent)
         bt_check_fault(
             k, key,
@@ -153,216 +211,31 @@ static void check_domain(const check *k)
     check_closing(k, "domain.sides_closing", "domain.sides", c->domain.sides_closing, c->domain.sides, c->domain.width);
 }
 
-static void check_region(const check *k)
+/// Reported elsewhere: sizes in the wrong order, a region without room.
+static void check_floes_made(const check *k)
 {
     const bt_case *c = k->c;
-    if (!bt_check_sound(k, "domain.x0 domain.y0 domain.length domain.width ice.x_min ice.x_max ice.y_min ice.y_max"))
+    const bool power = c->ice.size_law == BT_SIZE_POWER;
+    const bool sized = power ? c->ice.size_min > 0 && c->ice.size_min < c->ice.size_max : c->ice.size > 0;
+    if (!bt_case_makes_ice(c) || !sized || c->ice.x_min >= c->ice.x_max || c->ice.y_min >= c->ice.y_max ||
+        !bt_check_sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent "
+                           "ice.size_spread ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length "
+                           "domain.width"))
         return;
-    double x1 = c->domain.x0 + c->domain.length, y1 = c->domain.y0 + c->domain.width,
-           slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (c->ice.x_min >= c->ice.x_max)
-        bt_check_fault(k, "ice.x_min", "%g m is not below ice.x_max, %g m: the ice region is empty; move one of them",
-                       c->ice.x_min, c->ice.x_max);
-    if (c->ice.y_min >= c->ice.y_max)
-        bt_check_fault(k, "ice.y_min", "%g m is not below ice.y_max, %g m: the ice region is empty; move one of them",
-                       c->ice.y_min, c->ice.y_max);
-    if (c->ice.x_min < c->domain.x0 - slack)
-        bt_check_fault(k, "ice.x_min", "%g m is outside the domain, which begins at %g m; move the region inside",
-                       c->ice.x_min, c->domain.x0);
-    if (c->ice.x_max > x1 + slack)
-        bt_check_fault(k, "ice.x_max", "%g m is outside the domain, which ends at %g m; move the region inside",
-                       c->ice.x_max, x1);
-    if (c->ice.y_min < c->domain.y0 - slack)
-        bt_check_fault(k, "ice.y_min", "%g m is outside the domain, which begins at %g m; move the region inside",
-                       c->ice.y_min, c->domain.y0);
-    if (c->ice.y_max > y1 + slack)
-        bt_check_fault(k, "ice.y_max", "%g m is outside the domain, which ends at %g m; move the region inside",
-                       c->ice.y_max, y1);
-}
-
-/// The field is made for the extent and cut to the ice region.
-static void check_extent(const check *k)
-{
-    const bt_case *c = k->c;
-    if (bt_case_reads_field(c)) return;
-    const struct { const char *key, *end; double at, of, sign; } all[] = {
-        {"ice.extent.x_min", "ice.x_min", c->ice.extent_x_min, c->ice.x_min, 1},
-        {"ice.extent.x_max", "ice.x_max", c->ice.extent_x_max, c->ice.x_max, -1},
-        {"ice.extent.y_min", "ice.y_min", c->ice.extent_y_min, c->ice.y_min, 1},
-        {"ice.extent.y_max", "ice.y_max", c->ice.extent_y_max, c->ice.y_max, -1}};
-    for (int i = 0; i < 4; i++)
-        if (bt_check_sound(k, all[i].key) && bt_check_sound(k, all[i].end) &&
-            all[i].sign * (all[i].at - all[i].of) > 1e-9 * (c->domain.length + c->domain.width))
-            bt_check_fault(k, all[i].key,
-                           "%g m is within the ice region, whose %s is %g m, and the field is cut from its extent; "
-                           "give at %s %g m, or leave the key out",
-                           all[i].at, all[i].end, all[i].of, all[i].sign > 0 ? "most" : "least", all[i].of);
-}
-
-static void check_sizes(const check *k)
-{
-    const bt_case *c = k->c;
-    if (bt_check_sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
-        bt_check_fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
-              BT_LEAST_THICKNESS);
-    if (bt_check_sound(k, "ice.rafting.kappa") && c->ice.rafting_kappa > 0 && c->ice.rafting_kappa < 2)
-        bt_check_fault(k, "ice.rafting.kappa",
-                       "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying "
-                       "over each other; "
-                       "0 = they do not, 10 to 34 is twice the published ratios of work to energy",
-                       c->ice.rafting_kappa);
-    if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
-        bt_check_fault(k, "ice.density",
-                       "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them",
-                       c->ice.density, c->water.density);
-    if (bt_check_sound(k, "ice.rafting.kappa ice.density water.density") && c->ice.rafting_kappa > 0 &&
-        c->ice.density == c->water.density)
-        bt_check_fault(k, "ice.rafting.kappa",
-                       "%g beside ice as heavy as water, %g kg/m3: sheets that do not float bear nothing at their "
-                       "edges; give ice.density, or 0 for rigid floes",
-                       c->ice.rafting_kappa, c->ice.density);
-    if (bt_case_reads_field(c) || c->ice.concentration == 0) return;
-    if (bt_check_sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
-        bt_check_fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water",
-                       c->ice.concentration, BT_LEAST_CONCENTRATION);
-    if (c->ice.size_law != BT_SIZE_POWER && bt_check_sound(k, "ice.size") && c->ice.size < BT_LEAST_SIZE)
-        bt_check_fault(k, "ice.size", "%g m is below %g m; check the unit", c->ice.size, BT_LEAST_SIZE);
-    if (c->ice.size_law == BT_SIZE_POWER && bt_check_sound(k, "ice.size_min") && c->ice.size_min > 0 &&
-        c->ice.size_min < BT_LEAST_SIZE)
-        bt_check_fault(k, "ice.size_min", "%g m is below %g m; check the unit", c->ice.size_min, BT_LEAST_SIZE);
-    if (!bt_check_sound(
-            k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread"))
-        return;
-    double lo = c->ice.size_min, hi = c->ice.size_max;
-    bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
-    if (power && !(lo > 0))
-        bt_check_fault(k, "ice.size_min", "is %g m and size_law power needs a smallest size; give it, as in 10 m", lo);
-    if (power && !(hi > 0))
-        bt_check_fault(k, "ice.size_max", "is %g m and size_law power needs a largest size; give it, as in 100 m", hi);
-    if (!ordered) bt_check_fault(k, "ice.size_min", "%g m is not below ice.size_max, %g m; swap them", lo, hi);
-    if (c->ice.size_law == BT_SIZE_LOGNORMAL && ordered && (c->ice.size < lo || (hi > 0 && c->ice.size > hi)))
-        bt_check_fault(k, "ice.size", "%g m is not between ice.size_min and ice.size_max; change one of them",
-                       c->ice.size);
-    if (!ordered || (power && !(lo > 0 && hi > 0))) return;
-
-    if (!bt_check_sound(k, "ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length domain.width"))
-        return;
-    double room = bt_min(c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
-    if (room <= 0) return; // reported by check_region
-    if (power && hi > room)
-        bt_check_fault(k, "ice.size_max",
-                       "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
-    else if (!power && c->ice.size > room)
-        bt_check_fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region",
-                       c->ice.size, room);
-    const double period[2] = {bt_bound_wraps(c->domain.ends) ? c->domain.length : INFINITY,
-                              bt_bound_wraps(c->domain.sides) ? c->domain.width : INFINITY};
-    const double least = bt_min(period[0], period[1]);
-    if (c->ice.size_law != BT_SIZE_SINGLE && 2 * hi >= least && hi <= room) // else a run is refused by its seed
-        bt_check_fault(k, "ice.size_max",
-                       "two floes of %g m have no room side by side in the period of %g m as they turn; take smaller "
-                       "floes or a larger domain",
-                       hi, least);
-    double n = bt_case_floes_made(c);
+    const double n = bt_case_floes_made(c);
     if (n > BT_MOST_FLOES)
         bt_check_fault(k, power ? "ice.size_min" : "ice.size",
                        "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
                        BT_MOST_FLOES);
 }
 
-static void check_splitting(const check *k)
-{
-    const bt_case *c = k->c;
-    if (!bt_check_sound(k, "ice.splitting.toughness")) return;
-    if (!(c->ice.splitting.toughness > 0)) return;
-    if (bt_check_sound(k, "domain.ends") && c->domain.ends == BT_BOUND_MOVING)
-        bt_check_fault(k, "ice.splitting.toughness",
-                       "floes that split are not supported with domain.ends: moving, where a floe that is left behind "
-                       "comes back ahead; set 0, or take another boundary and a domain as long as the tow");
-    if (bt_check_sound(k, "ice.splitting.scatter") && c->ice.splitting.scatter > 0 && c->ice.splitting.scatter < 2)
-        bt_check_fault(k, "ice.splitting.scatter",
-                       "a Weibull modulus of %g leaves floes without strength; give at least 2, as in 10, or 0 for the "
-                       "same strength everywhere",
-                       c->ice.splitting.scatter);
-    if (!bt_check_sound(k, "ice.splitting.least_size ice.thickness")) return;
-    const double least = c->ice.splitting.least_size;
-    if (isnan(least)) {
-        bt_check_fault(k, "ice.splitting.least_size",
-                       "has no default where ice.thickness is none; give the least width of a piece, as in 2 m");
-        return;
-    }
-    if (bt_case_reads_field(c) || c->ice.concentration == 0) return;
-    if (!bt_check_sound(k, "ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent")) return;
-    const bool power = c->ice.size_law == BT_SIZE_POWER;
-    const double largest = power ? c->ice.size_max : c->ice.size;
-    if (largest > 0 && !(least < largest))
-        bt_check_fault(k, "ice.splitting.least_size",
-                       "%g m is not below %s, %g m, so that no floe can split; give a smaller one, or "
-                       "ice.splitting.toughness: 0",
-                       least, power ? "ice.size_max" : "ice.size", largest);
-}
-
-static void check_outlines(const check *k)
-{
-    const bt_case *c = k->c;
-    if (!bt_check_sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.origin_east "
-                  "ice.origin_north ice.nonconvex"))
-        return;
-    if (c->ice.field && c->ice.outlines)
-        bt_check_fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys",
-                       c->ice.field);
-    const bool lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat), east = !isnan(c->ice.origin_east),
-               north = !isnan(c->ice.origin_north);
-    const bt_crs crs = c->ice.outlines_crs;
-    if (lon != lat)
-        bt_check_fault(
-            k, lon ? "ice.origin_lon" : "ice.origin_lat",
-            "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
-    if (east != north)
-        bt_check_fault(k, east ? "ice.origin_east" : "ice.origin_north",
-              "is given without the other coordinate of the origin; give both or none");
-    if (lon && east)
-        bt_check_fault(
-            k, "ice.origin_east",
-            "and ice.origin_lon both say where x = y = 0 is; keep those of the file's coordinates, metres or degrees");
-    if (c->ice.outlines && lon && crs != BT_CRS_FILE && crs != BT_CRS_LONLAT)
-        bt_check_fault(k, "ice.origin_lon",
-              "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin");
-    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME))
-        bt_check_fault(k, "ice.origin_east",
-              "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
-              "ice.outlines_crs: plane");
-    if (crs != BT_CRS_FILE && !c->ice.outlines)
-        bt_check_fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
-    if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
-        bt_check_fault(k, "ice.nonconvex",
-                       "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or "
-                       "ice.field, or remove the key");
-}
-
-static void check_polygon(const check *k, const char *key, bt_body_shape shape, int n, const char *shape_key)
-{
-    if (shape == BT_BODY_POLYGON && !n)
-        bt_check_fault(k, key, "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]");
-    if (shape != BT_BODY_POLYGON && n)
-        bt_check_fault(k, key, "is given but the shape is not polygon; set %s: polygon, or remove the corners",
-                       shape_key);
-}
-
 static bool check_body(const check *k, int *n, double *v)
 {
     const bt_case *c = k->c;
     *n = 0;
-    if (bt_check_sound(k, "body.shape body.vertices"))
-        check_polygon(k, "body.vertices", c->body.shape, c->body.n_vertices, "body.shape");
     if (c->body.shape == BT_BODY_ABSENT ||
         !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw"))
         return false;
-    if (c->body.shape == BT_BODY_SQUARE && c->body.width != c->body.length)
-        bt_check_fault(
-            k, "body.width",
-            "%g m differs from body.length, %g m, and the shape is square; remove the key or set body.shape: rectangle",
-            c->body.width, c->body.length);
     if (c->body.shape == BT_BODY_POLYGON && !c->body.n_vertices) return false;
     const char *why = NULL;
     *n = bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, &why);
@@ -412,14 +285,6 @@ static void check_tow(const check *k)
                            c->tow.speed);
         else c->tow.speed = 0;
     }
-    if (c->tow.mode != BT_TOW_SPEED) return;
-    static const char *const start[] = {"body.vx", "body.vy", "body.yaw_rate"};
-    const double value[] = {c->body.vx, c->body.vy, c->body.yaw_rate};
-    for (int i = 0; i < 3; i++)
-        if (value[i] != 0 && bt_check_sound(k, start[i]))
-            bt_check_fault(
-                k, start[i],
-                "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
 }
 
 /// Way of the tow after which the body meets a wall, `room` ahead of it at the start, that comes with this speed;
@@ -514,29 +379,6 @@ static void check_squeeze(const check *k, const char *key, double closing, doubl
                        closing, left, needed, floor((extent - needed) / (2 * closing * c->run.dt)) * c->run.dt);
 }
 
-static void check_water(const check *k)
-{
-    const bt_case *c = k->c;
-    if (!bt_check_sound(k, "water.tilt")) return;
-    if (c->water.tilt == BT_TILT_GEOSTROPHIC && c->water.latitude == 0 && bt_check_sound(k, "water.latitude"))
-        bt_check_fault(k, "water.tilt", "geostrophic balance needs the Coriolis force; give water.latitude");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && bt_check_sound(k, "water.slope_x"))
-        bt_check_fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && bt_check_sound(k, "water.slope_y"))
-        bt_check_fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
-}
-
-static void check_estimate(const check *k)
-{
-    const bt_case *c = k->c;
-    if (bt_check_sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
-        bt_check_fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa,
-                       c->estimate.kappa_low);
-    if (bt_check_sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
-        bt_check_fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa,
-                       c->estimate.kappa_high);
-}
-
 static void check_floe(const check *k, int index)
 {
     const bt_case *c = k->c;
@@ -594,21 +436,16 @@ bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
     size_t before = err->n;
     bool by_hand = false;
     for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || isnan(c->floes[i].thickness);
-    bt_case_frame_clear(&k, by_hand);
+    clear_at_sea(&k, by_hand);
     bt_case_tow_course(&k);
     follow(&k);
     bt_case_tow_follow(&k);
-    bt_status loaded = bt_case_load_tables(c, err);
+    bt_status loaded = bt_case_read_flow_tables(c, err);
     size_t at_files = err->n;
-    bt_case_frame_check(&k, by_hand);
+    check_at_sea(&k, by_hand);
     check_run(&k);
     check_domain(&k);
-    check_region(&k);
-    check_extent(&k);
-    check_sizes(&k);
-    check_splitting(&k);
-    check_outlines(&k);
-    bt_case_check_idle(&k);
+    check_floes_made(&k);
     double v[2 * BT_MAX_VERTICES];
     int n;
     bool placed = check_body(&k, &n, v);
@@ -623,11 +460,9 @@ bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
     if (placed && c->domain.sides == BT_BOUND_WALL)
         check_squeeze(&k, "domain.sides_closing", c->domain.sides_closing, c->domain.width, n, v);
     bt_case_check_window(&k, n, v);
-    check_water(&k);
-    bt_case_check_environment(&k);
+    bt_case_check_tables(&k);
     bt_case_lead_follow(c, n, v);
-    bt_case_check_lead(&k);
-    check_estimate(&k);
+    bt_case_check_constraints(&k);
     for (bt_idx i = 0; i < c->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&k, i);
     if (err->n == before) bt_case_check_cost(&k);
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;

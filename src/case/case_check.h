@@ -35,16 +35,13 @@ void bt_case_fill_impact(bt_case *c);
 char *bt_case_named_file(const char *from, const char *file);
 
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.
-bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
+bt_status bt_case_read_flow_tables(bt_case *c, bt_errors *err);
 
-/// Checks of current and wind in time.
-void bt_case_check_environment(const bt_check *k);
+/// Do the tables cover the run?
+void bt_case_check_tables(const bt_check *k);
 
 /// Width and length of the lead that follow from the body and the tow. The waterline is v [n][2], n = 0 without a body.
 void bt_case_lead_follow(bt_case *c, int n, const double *v);
-
-/// Checks of the lead.
-void bt_case_check_lead(const bt_check *k);
 
 #define BT_ODD_MASS 4.0     ///< mass / displaced water, or its inverse, beyond which a unit may be wrong, assumed
 /// draft / least width of the waterline beyond which a body would hardly stay upright, assumed: a column of ice of

@@ -450,28 +450,6 @@ static void check_programme(const bt_check *k)
             k, "tow.ramp",
             "%g s has no effect with tow.programme, which reaches its largest speed at %g s; remove one of them",
             c->tow.ramp, time);
-    if (c->tow.mode == BT_TOW_NONE && speed > 0 && bt_check_sound(k, "tow.mode"))
-        bt_check_fault(k, "tow.programme", "has no effect with tow.mode: none; remove it or set another mode");
-}
-
-static void check_lines(const bt_check *k)
-{
-    const bt_case *c = k->c;
-    const char *mode = c->tow.mode == BT_TOW_THRUST ? "thrust" : "line";
-    if (!bt_check_sound(k, "tow.mode") || !has_line(c)) return;
-    if (!(c->tow.line_length > 0) && bt_check_sound(k, "tow.line_length"))
-        bt_check_fault(k, "tow.line_length", "is %g m and tow.mode %s needs a line; give its length, as in 5 m",
-                       c->tow.line_length, mode);
-    if (!bt_check_sound(k, "tow.line.type tow.line.diameter")) return;
-    const bool named = c->tow.line.type != BT_ROPE_NUMBERS;
-    if (named && !(c->tow.line.diameter > 0))
-        bt_check_fault(k, "tow.line.diameter", "is %g m and a named line needs a diameter; give it, as in 60 mm",
-                       c->tow.line.diameter);
-    else if (!(c->tow.line_stiffness > 0) && bt_check_sound(k, "tow.line_stiffness"))
-        bt_check_fault(k, "tow.line_stiffness", "is %g N and tow.mode %s needs a stiffness EA; give it, as in 10 kN",
-                       c->tow.line_stiffness, mode);
-    if (!named && c->tow.line.diameter != 0)
-        bt_check_fault(k, "tow.line.diameter", "has no effect without a named line; set tow.line.type, or remove it");
 }
 
 /// How far a point lies outside a convex outline, m; within it less than 0.
@@ -507,23 +485,6 @@ static void check_fastening(const bt_check *k)
     }
 }
 
-static void check_vessel(const bt_check *k)
-{
-    const bt_case *c = k->c;
-    if (c->tow.mode != BT_TOW_THRUST || !bt_check_sound(k, "tow.mode")) return;
-    static const char *const key[] = {"tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"};
-    static const char *const example[] = {"3000 t", "1 MN", "15 kn"};
-    const double value[] = {c->tow.vessel.mass, c->tow.vessel.bollard_pull, c->tow.vessel.free_speed};
-    for (int i = 0; i < 3; i++)
-        if (!(value[i] > 0) && bt_check_sound(k, key[i]))
-            bt_check_fault(k, key[i], "is %g and tow.mode thrust needs it; give it, as in %s", value[i], example[i]);
-    if (c->tow.vessel.free_resistance > c->tow.vessel.bollard_pull &&
-        bt_check_sound(k, "tow.vessel.free_resistance tow.vessel.bollard_pull"))
-        bt_check_fault(k, "tow.vessel.free_resistance",
-                       "%g N is more than tow.vessel.bollard_pull, %g N: thrust does not grow with speed; lower it",
-                       c->tow.vessel.free_resistance, c->tow.vessel.bollard_pull);
-}
-
 /// First time at which the body, led along the path or trailing behind what is, leaves the walls; negative = never. At
 /// TIMES times of the run.
 static double time_of_wall(const bt_case *c)
@@ -555,15 +516,7 @@ static void check_waypoints(const bt_check *k)
     if (!bt_check_sound(k, "tow.waypoints tow.turn_radius tow.direction tow.mode tow.line_length tow.line.branches "
                            "body.x body.y body.yaw"))
         return;
-    if (c->tow.n_waypoints == 0) {
-        if (c->tow.turn_radius > 0)
-            bt_check_fault(k, "tow.turn_radius", "has no effect without tow.waypoints; give them or remove it");
-        return;
-    }
-    if (c->tow.mode == BT_TOW_NONE) {
-        bt_check_fault(k, "tow.waypoints", "have no effect with tow.mode: none; remove them or set another mode");
-        return;
-    }
+    if (c->tow.n_waypoints == 0 || c->tow.mode == BT_TOW_NONE) return; // that has no effect: constraints.c
     const double dx = c->tow.waypoints[0] - c->body.x, dy = c->tow.waypoints[1] - c->body.y, course = bt_atan2(dy, dx);
     if (fabs(remainder(c->tow.direction - course, 2 * BT_PI)) > 1e-9) {
         bt_check_fault(k, "tow.direction",
@@ -617,9 +570,7 @@ void bt_case_tow_check(const bt_check *k)
 {
     const bt_case *c = k->c;
     check_programme(k);
-    check_lines(k);
     check_fastening(k);
-    check_vessel(k);
     double start[2];
     if (has_line(c) &&
         bt_check_sound(k, "tow.mode tow.line_length tow.line.branches tow.branch2.length tow.hull_x tow.hull_y "

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "case/case_check.h"
-#include "case/case_idle.h"
+#include "case/constraints.h"
 #include "case/schema.h"
 
 static const struct {

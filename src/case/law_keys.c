@@ -56,7 +56,7 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
     return all;
 }
 
-void bt_keys_values(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own)
+void bt_keys_get(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own)
 {
     for (int k = 0; k < n; k++) {
         char name[128];

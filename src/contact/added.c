@@ -26,7 +26,7 @@ void bt_added_setup(const bt_case *c, bt_params *p)
     p->added_laws = n_added;
     for (int k = 0; k < n_added; k++) {
         double *own = p->law_own[BT_LAWS + k];
-        bt_keys_values(c, added[k]->name, added[k]->keys, added[k]->n_keys, own);
+        bt_keys_get(c, added[k]->name, added[k]->keys, added[k]->n_keys, own);
         if (added[k]->setup) added[k]->setup(c, own);
     }
 }

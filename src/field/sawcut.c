@@ -83,7 +83,7 @@ static int by_key(const void *a, const void *b)
 
 // Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips;
 // *last: width of the last strip over the width due to it.
-static bt_idx assign(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
+static bt_idx fill_strips(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
 {
     bt_idx n_strips = 0;
     double width = 0;
@@ -125,12 +125,12 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     double best = INFINITY, chosen = aspect;
     for (int k = -20; k <= 20; k++) {
         double trial = aspect * bt_exp(0.01 * k), last;
-        assign(n, p, share / lx, trial, lx, first, &last);
+        fill_strips(n, p, share / lx, trial, lx, first, &last);
         double cost = fabs(0.01 * k) + fabs(bt_log(last));
         if (cost < best) best = cost, chosen = trial;
     }
     double last;
-    bt_idx n_strips = assign(n, p, share / lx, chosen, lx, first, &last);
+    bt_idx n_strips = fill_strips(n, p, share / lx, chosen, lx, first, &last);
     for (bt_idx k = 0; k < n_strips; k++) {
         bt_rng r = bt_rng_start(seed, BT_RNG_CUT, (int64_t)n + k);
         strip[k] = (piece){bt_rng_uniform(&r), 0, k};

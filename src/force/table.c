@@ -110,7 +110,7 @@ void bt_forces_setup(bt_world *w, const bt_case *c)
 {
     for (int k = 0; k < w->forces->n; k++) {
         const bt_force_law *law = bt_force_laws[k];
-        bt_keys_values(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
+        bt_keys_get(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
         if (law->setup) law->setup(c, w->forces->own[k]);
     }
 }

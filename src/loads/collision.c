@@ -37,7 +37,7 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-bt_collision bt_collision_of(const bt_world *w, const bt_contact *u)
+bt_collision bt_contact_collision(const bt_world *w, const bt_contact *u)
 {
     const bt_bodies *b = &w->bodies;
     const double total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};

@@ -15,7 +15,7 @@ typedef struct bt_collision {
 } bt_collision;
 
 /// Contact u with a normal impulse above 0, after the solve and before poses move.
-bt_collision bt_collision_of(const bt_world *w, const bt_contact *u);
+bt_collision bt_contact_collision(const bt_world *w, const bt_contact *u);
 
 typedef struct bt_contact_corner {
     double angle;     ///< interior, rad; NaN if there is none

@@ -36,7 +36,7 @@ static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_c
     const bool is_b = u->b == towed;
     const bt_idx other = is_b ? u->a : u->b;
     const double sign = is_b ? 1 : -1;
-    const bt_collision q = bt_collision_of(w, u);
+    const bt_collision q = bt_contact_collision(w, u);
 
     // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
     const double along = is_b ? u->rbt : u->rat, arm = is_b ? q.rbn : q.ran;

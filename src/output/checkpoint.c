@@ -8,7 +8,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "bergtow/quantity.h"
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/snapshot.h"
@@ -66,17 +65,13 @@ static const row rows[] = {
 
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)
 {
-    static const char added[] = "history/added_";
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++)
         if (!strcmp(rows[k].name, name)) {
             *units = rows[k].units;
             *axes = rows[k].axes;
             return rows[k].meaning;
         }
-    const bt_quantity *q = strncmp(name, added, sizeof added - 1) ? NULL : bt_series_find(name + sizeof added - 1);
-    *units = q ? q->units : NULL;
-    *axes = "time";
-    return q ? q->description : NULL;
+    return NULL;
 }
 
 // --- files -----------------------------------------------------------------------------------------------------------

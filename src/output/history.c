@@ -7,45 +7,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define COLUMN(column, name, member, units, meaning) \
-    [column] = {name, BT_ITEM_F64, 1, offsetof(bt_sample, member), units, meaning, "time", BT_ROW_ANY, NULL}
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 
-/// Places are those in bt_sample.
-static const bt_state_row columns[BT_N_COLUMNS] = {
-    COLUMN(BT_COL_TIME, "time", time, "s", "end of each step"),
-    COLUMN(BT_COL_ICE, "ice", ice_resistance, "N", "ice resistance of each step"),
-    COLUMN(BT_COL_TOW, "tow", tow_force, "N", "tow force of each step"),
-    COLUMN(BT_COL_DRAG, "drag", drag_force, "N", "drag of each step"),
-    COLUMN(BT_COL_CORIOLIS, "coriolis", coriolis_force, "N", "Coriolis force of each step"),
-    COLUMN(BT_COL_TILT, "tilt", tilt_force, "N", "force by the tilt of the sea surface of each step"),
-    COLUMN(BT_COL_INERTIA, "inertia", inertia_force, "N", "inertia of the body in each step"),
-    COLUMN(BT_COL_BUDGET, "budget", ice_resistance_budget, "N", "ice resistance by momentum of each step"),
-    COLUMN(BT_COL_TENSION_1, "tension_1", line_tension_1, "N", "tension of the first branch in each step"),
-    COLUMN(BT_COL_TENSION_2, "tension_2", line_tension_2, "N", "tension of the second branch in each step"),
-    COLUMN(BT_COL_THRUST, "thrust", vessel_thrust, "N", "thrust of the vessel in each step"),
-    COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged, "1", "1 = the step did not converge"),
-    COLUMN(BT_COL_RESIDUAL, "residual", residual, "m/s", "residual of each step"),
-    COLUMN(BT_COL_COLLISION, "collision", collision_resistance, "N",
-        "part of the resistance of each step that collisions have"),
-    COLUMN(BT_COL_QUASI_STATIC, "quasi_static", largest_quasi_static_load, "N",
-        "largest force of a floe on the body that is no collision, of each step"),
-    COLUMN(BT_COL_SPEED_ICE, "speed_through_ice", speed_through_ice, "m/s",
-        "speed of the body through undisturbed ice, of each step"),
-    COLUMN(BT_COL_LEEWAY_ICE, "leeway_through_ice", leeway_through_ice, "m/s",
-        "the same across the tow, from +x towards +y"),
-    COLUMN(BT_COL_SPEED_WATER, "speed_through_water", speed_through_water, "m/s",
-        "speed of the body through the water, along the tow, in each step"),
-    COLUMN(BT_COL_LEEWAY_WATER, "leeway_through_water", leeway_through_water, "m/s",
-        "the same across the tow, from +x towards +y"),
-    COLUMN(BT_COL_IN_ICE_X, "body_in_ice_x", body_in_ice_x, "m",
-        "place of the body in a frame that drifts with undisturbed ice, x, after each step"),
-    COLUMN(BT_COL_IN_ICE_Y, "body_in_ice_y", body_in_ice_y, "m", "the same, y"),
-    COLUMN(BT_COL_VX, "body_vx", body_vx, "m/s", "velocity of the body over ground, x, in each step"),
-    COLUMN(BT_COL_VY, "body_vy", body_vy, "m/s", "the same, y"),
-    COLUMN(BT_COL_YAW, "body_yaw", body_yaw, "rad", "yaw of the towed body"),
-    COLUMN(BT_COL_NO_LOAD, "no_load", no_load, "1", "1 = the load of the body had no bound in the step"),
-};
+#define NAME(id, name, member) name,
+#define PLACE(id, name, member) offsetof(bt_sample, member),
+static const char *const names[] = {BT_HISTORY_COLUMNS(NAME)};
+static const size_t places[] = {BT_HISTORY_COLUMNS(PLACE)};
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)
 {
@@ -137,14 +104,15 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
     }
 }
 
-const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
+bt_state_row bt_history_column(int k, char name[BT_HISTORY_NAME])
 {
-    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "history/%s", columns[k].name);
-    else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", bt_added(k - BT_N_COLUMNS)->name);
-    return name;
+    const bt_quantity *q = k < BT_N_COLUMNS ? bt_own_series : bt_added(k - BT_N_COLUMNS);
+    while (k < BT_N_COLUMNS && q->offset != places[k]) q++;
+    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "history/%s", names[k]);
+    else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", q->name);
+    return (bt_state_row){strchr(name, '/') + 1, BT_ITEM_F64, 1, q->offset, q->units, q->description, "time",
+                          BT_ROW_ANY, NULL};
 }
-
-const bt_state_row *bt_history_column(int k) { return &columns[k]; }
 
 void bt_history_init(bt_history *h) { *h = (bt_history){.n_columns = BT_N_COLUMNS + bt_n_added()}; }
 
@@ -162,7 +130,7 @@ void bt_history_add(bt_history *h, const bt_sample *s)
             h->column[k] = bt_realloc(h->column[k], (size_t)h->cap, sizeof(double));
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
-        h->column[k][h->n] = *(const double *)(const void *)((const char *)s + columns[k].offset);
+        h->column[k][h->n] = *(const double *)(const void *)((const char *)s + places[k]);
     static const bt_column loads[] = {BT_COL_ICE, BT_COL_TOW, BT_COL_BUDGET, BT_COL_QUASI_STATIC};
     for (size_t i = 0; s->no_load != 0 && i < sizeof loads / sizeof *loads; i++) {
         double *x = h->column[loads[i]] + h->n;

@@ -7,33 +7,39 @@
 #include "contact/law.h"
 #include "output/sample.h"
 
-/// Columns of what the summary keeps of every step; names and members of the sample: history.c.
+/// Columns of what the summary keeps of every step: X(id, name in a checkpoint, member of bt_sample). Units and meaning
+/// are those of the series of that member.
+#define BT_HISTORY_COLUMNS(X) \
+    X(TIME, "time", time) \
+    X(ICE, "ice", ice_resistance) \
+    X(TOW, "tow", tow_force) \
+    X(DRAG, "drag", drag_force) \
+    X(CORIOLIS, "coriolis", coriolis_force) \
+    X(TILT, "tilt", tilt_force) \
+    X(INERTIA, "inertia", inertia_force) \
+    X(BUDGET, "budget", ice_resistance_budget) \
+    X(TENSION_1, "tension_1", line_tension_1) \
+    X(TENSION_2, "tension_2", line_tension_2) \
+    X(THRUST, "thrust", vessel_thrust) \
+    X(UNCONVERGED, "unconverged_step", unconverged) \
+    X(RESIDUAL, "residual", residual) \
+    X(COLLISION, "collision", collision_resistance) \
+    X(QUASI_STATIC, "quasi_static", largest_quasi_static_load) \
+    X(SPEED_ICE, "speed_through_ice", speed_through_ice) \
+    X(LEEWAY_ICE, "leeway_through_ice", leeway_through_ice) \
+    X(SPEED_WATER, "speed_through_water", speed_through_water) \
+    X(LEEWAY_WATER, "leeway_through_water", leeway_through_water) \
+    X(IN_ICE_X, "body_in_ice_x", body_in_ice_x) \
+    X(IN_ICE_Y, "body_in_ice_y", body_in_ice_y) \
+    X(VX, "body_vx", body_vx) \
+    X(VY, "body_vy", body_vy) \
+    X(YAW, "body_yaw", body_yaw) \
+    X(NO_LOAD, "no_load", no_load)
+
 typedef enum bt_column {
-    BT_COL_TIME,
-    BT_COL_ICE,
-    BT_COL_TOW,
-    BT_COL_DRAG,
-    BT_COL_CORIOLIS,
-    BT_COL_TILT,
-    BT_COL_INERTIA,
-    BT_COL_BUDGET,
-    BT_COL_TENSION_1,
-    BT_COL_TENSION_2,
-    BT_COL_THRUST,
-    BT_COL_UNCONVERGED,
-    BT_COL_RESIDUAL,
-    BT_COL_COLLISION,
-    BT_COL_QUASI_STATIC,
-    BT_COL_SPEED_ICE,
-    BT_COL_LEEWAY_ICE,
-    BT_COL_SPEED_WATER,
-    BT_COL_LEEWAY_WATER,
-    BT_COL_IN_ICE_X,
-    BT_COL_IN_ICE_Y,
-    BT_COL_VX, ///< over ground
-    BT_COL_VY,
-    BT_COL_YAW,
-    BT_COL_NO_LOAD,
+#define BT_COLUMN_ID(id, name, member) BT_COL_##id,
+    BT_HISTORY_COLUMNS(BT_COLUMN_ID)
+#undef BT_COLUMN_ID
     BT_N_COLUMNS
 } bt_column;
 
@@ -64,11 +70,9 @@ typedef struct bt_total {
 int bt_n_history_totals(void);
 const bt_total *bt_history_total(int k);
 
-/// Name of a column in the checkpoint; returns name.
 #define BT_HISTORY_ADDED "history/added_"
-const char *bt_history_name(int k, char name[BT_HISTORY_NAME]);
-/// The column of the program's own, k < BT_N_COLUMNS, as it is in a checkpoint.
-const bt_state_row *bt_history_column(int k);
+/// Column k of a history as it is in a checkpoint; its name there, with the group, is written to name.
+bt_state_row bt_history_column(int k, char name[BT_HISTORY_NAME]);
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.
 static inline double bt_max_seen(double a, double b) { return a >= b || a != a ? a : b; }

@@ -156,10 +156,10 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_history *h = &r->history;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
-    for (int k = 0; k < BT_N_COLUMNS; k++)
-        bt_snapshot_add_row(s, "history", bt_history_column(k), h->n, h->column[k]);
-    for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
-        bt_snapshot_add(s, bt_history_name(k, name), BT_ITEM_F64, h->n, 1, h->column[k]);
+    for (int k = 0; k < h->n_columns; k++) {
+        const bt_state_row column = bt_history_column(k, name);
+        bt_snapshot_add_row(s, "history", &column, h->n, h->column[k]);
+    }
     bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
@@ -216,9 +216,10 @@ static void check_added(bt_snapshot *s)
 {
     const char *missing = NULL, *left_over = NULL;
     char name[BT_HISTORY_NAME];
-    for (int k = 0; k < bt_n_added() && !missing; k++)
-        if (!bt_snapshot_find(s, bt_history_name(BT_N_COLUMNS + k, name)) && !was_zero(bt_added(k)))
-            missing = bt_added(k)->name;
+    for (int k = 0; k < bt_n_added() && !missing; k++) {
+        bt_history_column(BT_N_COLUMNS + k, name);
+        if (!bt_snapshot_find(s, name) && !was_zero(bt_added(k))) missing = bt_added(k)->name;
+    }
     for (int i = 0; i < s->n && !left_over; i++) {
         if (strncmp(s->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || all_zero(&s->item[i])) continue;
         left_over = s->item[i].name + strlen(BT_HISTORY_ADDED);
@@ -245,8 +246,9 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < h->n_columns; k++) {
         free(h->column[k]);
-        const bool there = k < BT_N_COLUMNS || bt_snapshot_find(s, bt_history_name(k, name));
-        h->column[k] = there ? bt_snapshot_copy(s, bt_history_name(k, name), BT_ITEM_F64, 1, &n)
+        bt_history_column(k, name);
+        const bool there = k < BT_N_COLUMNS || bt_snapshot_find(s, name);
+        h->column[k] = there ? bt_snapshot_copy(s, name, BT_ITEM_F64, 1, &n)
                              : bt_alloc((size_t)n, sizeof *h->column[k]);
         bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
     }

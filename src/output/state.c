@@ -20,26 +20,19 @@
 #include "step/window.h"
 #include "partition/domain.h"
 
-/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it
-/// by itself. What members must be to each other: state_check.c.
-#define MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
-    {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_, NULL}
-#define ONE(struct_, label, type_, member, units_, check_, meaning_) \
-    MEMBER(struct_, label, type_, 1, member, units_, "one", check_, meaning_)
 #define ADDED_LAWS "contacts/added_laws"
 #define ADDED_FORCES "forces/added_laws"
-#define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
 
 // --- the tables ------------------------------------------------------------------------------------------------------
 
-#define WORLD(type, member, units, check, meaning) ONE(bt_world, #member, type, member, units, check, meaning)
+#define WORLD(type, member, units, check, meaning) BT_STATE_ONE(bt_world, #member, type, member, units, check, meaning)
 static const bt_state_row world_rows[] = {
     WORLD(I64, step, "1", COUNT, "steps done"),
     WORLD(F64, drift_x, "m", FINITE, "way that the water has gone, x"),
     WORLD(F64, drift_y, "m", FINITE, "way that the water has gone, y"),
 };
 
-#define PAR(member, units, check, meaning) ONE(bt_params, #member, F64, member, units, check, meaning)
+#define PAR(member, units, check, meaning) BT_STATE_ONE(bt_params, #member, F64, member, units, check, meaning)
 /// Of the last step where they change with time; the others show that the case is the one of the checkpoint.
 static const bt_state_row par_rows[] = {
     PAR(dt, "s", FINITE, "time step"),
@@ -61,7 +54,7 @@ static const bt_state_row par_rows[] = {
     PAR(tilt_ay, "m/s2", FINITE, "acceleration by the tilt of the sea surface beyond that balance, y"),
 };
 
-#define CELLS(type, member, units, check, meaning) ONE(bt_cells, #member, type, member, units, check, meaning)
+#define CELLS(type, member, units, check, meaning) BT_STATE_ONE(bt_cells, #member, type, member, units, check, meaning)
 static const bt_state_row cells_rows[] = {
     CELLS(F64, x0, "m", FINITE, "low corner of the grid of cells, x"),
     CELLS(F64, y0, "m", FINITE, "low corner of the grid of cells, y"),
@@ -82,11 +75,11 @@ static const bt_state_row cells_rows[] = {
     CELLS(I64, n_labellings, "1", COUNT, "times that the cells were labelled"),
 };
 
-#define TOW(type, member, units, check, meaning) ONE(bt_tow, #member, type, member, units, check, meaning)
+#define TOW(type, member, units, check, meaning) BT_STATE_ONE(bt_tow, #member, type, member, units, check, meaning)
 #define BRANCH(label, type, k, member, units, check, meaning) \
-    ONE(bt_tow, label, type, branch[k].member, units, check, meaning)
+    BT_STATE_ONE(bt_tow, label, type, branch[k].member, units, check, meaning)
 #define VESSEL(member, units, check, meaning) \
-    ONE(bt_tow, "vessel_" #member, F64, vessel.member, units, check, meaning)
+    BT_STATE_ONE(bt_tow, "vessel_" #member, F64, vessel.member, units, check, meaning)
 static const bt_state_row tow_rows[] = {
     TOW(F64, time, "s", ANY, "time of the tow"),
     TOW(F64, carriage_x, "m", FINITE, "towing end of the line, x"),
@@ -109,7 +102,7 @@ static const bt_state_row tow_rows[] = {
 };
 
 #define WINDOW(type, width, member, units, axes, check, meaning) \
-    MEMBER(bt_window, #member, type, width, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(bt_window, #member, type, width, member, units, axes, check, meaning)
 static const bt_state_row window_rows[] = {
     WINDOW(F64, 1, start, "m", "one", FINITE, "place of the rear end at first, along the tow"),
     WINDOW(I64, 1, renewed, "1", "one", COUNT, "floes renewed in all"),
@@ -123,12 +116,12 @@ static const bt_state_row window_rows[] = {
         "momentum x, y and kinetic energy of the floes brought in, in all"),
     WINDOW(F64, 1, most, "m", "one", FINITE, "largest way of the body through undisturbed ice, along the tow"),
     WINDOW(F64, 1, overtaken, "m", "one", FINITE, "by how much it fell behind that, at most"),
-    ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
+    BT_STATE_ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
         "place of the rear end now, along the tow, in a frame that drifts with undisturbed ice"),
 };
 
 #define UNDISTURBED(width, member, units, axes, check, meaning) \
-    MEMBER(bt_undisturbed, #member, F64, width, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(bt_undisturbed, #member, F64, width, member, units, axes, check, meaning)
 static const bt_state_row undisturbed_rows[] = {
     UNDISTURBED(1, drift_x, "m", "one", FINITE, "way of the undisturbed ice, x"),
     UNDISTURBED(1, drift_y, "m", "one", FINITE, "way of the undisturbed ice, y"),
@@ -162,10 +155,10 @@ const bt_state_row bt_split_total_rows[] = {
     SPLIT_TOTAL("largest_refused", F64, largest_refused, "largest_refused_ratio", "1", NOT_NEGATIVE,
         "largest stress over strength of a floe that could not split"),
 };
-const int bt_n_split_total_rows = N_OF(bt_split_total_rows);
+const int bt_n_split_total_rows = BT_N_OF(bt_split_total_rows);
 
 #define SPLIT(type, width, member, units, axes, check, meaning) \
-    MEMBER(bt_split_record, #member, type, width, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(bt_split_record, #member, type, width, member, units, axes, check, meaning)
 static const bt_state_row split_columns[] = {
     SPLIT(I64, 1, step, "1", "split", COUNT, "steps done before the one in which each floe split"),
     SPLIT(I64, 1, parent, "1", "split", COUNT, "id of the floe"),
@@ -188,89 +181,6 @@ enum {
     PANEL_WIDTH = sizeof(bt_panel) / sizeof(double)
 };
 
-#define STALL(type, member, units, check, meaning) ONE(bt_stall, #member, type, member, units, check, meaning)
-static const bt_state_row stall_rows[] = {
-    STALL(I64, windows, "1", COUNT, "windows of time in which the body stood still"),
-    STALL(F64, time, "s", FINITE, "time of these"),
-    STALL(F64, asked, "m", FINITE, "way asked for in the window under way"),
-    STALL(F64, spent, "s", FINITE, "time spent in it"),
-    STALL(F64, from_x, "m", FINITE, "where the body was at its beginning, x"),
-    STALL(F64, from_y, "m", FINITE, "where the body was at its beginning, y"),
-    STALL(U8, begun, "1", ANY, "1 = such a window is under way"),
-    STALL(F64, ice, "N s", FINITE, "impulse of the ice against the tow in it"),
-    STALL(F64, pull, "N s", FINITE, "impulse of the tow in it"),
-    STALL(F64, inside, "s", ANY, "time for which the towing end was within the hull, after it had been outside"),
-    STALL(F64, inside_from, "s", ANY, "when it first was"),
-    STALL(U8, outside, "1", ANY, "1 = the towing end has been outside the hull"),
-};
-
-#define LEAD(type, member, units, check, meaning) ONE(bt_lead_stats, #member, type, member, units, check, meaning)
-static const bt_state_row lead_rows[] = {
-    LEAD(I32, mode, "1", ANY, "kind of the lead ahead of the body"),
-    LEAD(F64, width, "m", ANY, "its width"),
-    LEAD(F64, length, "m", ANY, "its length"),
-    LEAD(I64, taken, "1", ANY, "floes taken out of it"),
-    LEAD(F64, area_taken, "m2", ANY, "their area"),
-    LEAD(I64, pieces, "1", ANY, "pieces that were put into it"),
-    LEAD(F64, mean_piece, "m", ANY, "their mean size"),
-    LEAD(F64, concentration_before, "1", ANY, "concentration of the ice before the lead was made"),
-    LEAD(F64, concentration_after, "1", ANY, "concentration of the ice after it"),
-};
-
-#define FIELD(type, label, member, units, check, meaning) ONE(bt_field, label, type, member, units, check, meaning)
-static const bt_state_row field_rows[] = {
-    FIELD(F64, "ice_area", ice_area, "m2", ANY, "area that the concentration of the field refers to"),
-    FIELD(F64, "concentration", concentration, "1", ANY, "share of the ice region that they cover"),
-    FIELD(I64, "read", outlines.read, "1", COUNT, "outlines that were read"),
-    FIELD(I64, "turned", outlines.turned, "1", COUNT, "outlines that ran clockwise"),
-    FIELD(I64, "dropped", outlines.dropped, "1", COUNT, "outlines that were dropped"),
-    FIELD(I64, "hulled", outlines.hulled, "1", COUNT, "outlines that were replaced by their hull"),
-    FIELD(F64, "hull_area", outlines.hull_area, "m2", ANY, "area that the hulls added"),
-    FIELD(I64, "split", outlines.split, "1", COUNT, "outlines that were split into convex parts"),
-    FIELD(I64, "parts", outlines.parts, "1", COUNT, "parts of these"),
-    FIELD(F64, "lon", outlines.lon, "rad", ANY, "longitude of the origin of the map"),
-    FIELD(F64, "lat", outlines.lat, "rad", ANY, "latitude of the origin of the map"),
-    FIELD(I64, "rounded", outlines.rounded, "1", COUNT, "floes not convex by rounding alone, taken for convex"),
-    FIELD(I64, "rounded_corners", outlines.rounded_corners, "1", COUNT, "corners that this left out"),
-    FIELD(F64, "rounded_area", outlines.rounded_area, "m2", ANY, "area that it added"),
-    FIELD(F64, "east", outlines.east, "m", ANY, "origin in the map, east"),
-    FIELD(F64, "north", outlines.north, "m", ANY, "origin in the map, north"),
-    FIELD(I64, "unnamed", outlines.unnamed, "1", COUNT,
-        "features without a thickness that have a property of nearly this name"),
-    FIELD(I64, "bare", outlines.bare, "1", ANY, "features without a thickness"),
-    FIELD(I64, "outside", outlines.outside, "1", ANY, "floes whose centroid is outside the ice region"),
-    FIELD(F64, "outside_area", outlines.outside_area, "m2", ANY, "area of floes outside the ice region"),
-    FIELD(F64, "own_area", outlines.own_area, "m2", ANY, "area that the concentration of a field file refers to"),
-    FIELD(F64, "region_area", outlines.region_area, "m2", ANY, "area of the case's ice region, beside it"),
-    FIELD(F64, "x_min", outlines.region[0], "m", ANY, "ice region of a field file, 0 as the other three for others"),
-    FIELD(F64, "y_min", outlines.region[1], "m", ANY, "the same, y"),
-    FIELD(F64, "x_max", outlines.region[2], "m", ANY, "its other end, x"),
-    FIELD(F64, "y_max", outlines.region[3], "m", ANY, "the same, y"),
-};
-
-_Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
-
-void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
-{
-    bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
-}
-void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
-{
-    bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
-}
-void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
-{
-    bt_snapshot_add_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
-}
-void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
-{
-    int32_t mode = 0;
-    bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
-    // before it is taken as one
-    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
-    if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
-}
-
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
 /// What a body carries from step to step. Everything else about it follows from the case and
@@ -283,7 +193,7 @@ typedef struct {
 
 /// Its columns in the file.
 #define BODY(label, type, width, member, units, axes, check, meaning) \
-    MEMBER(body_row, label, type, width, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(body_row, label, type, width, member, units, axes, check, meaning)
 static const bt_state_row body_columns[] = {
     BODY("pose", F64, 3, pose, "m, m, rad", "body component", FINITE, "x, y, yaw of every body, by id"),
     BODY("velocity", F64, 3, vel, "m/s, m/s, rad/s", "body component", FINITE,
@@ -396,7 +306,7 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
     int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
     for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
     bt_status status = BT_OK;
-    for (int k = 0; k < N_OF(body_columns) && status == BT_OK; k++) {
+    for (int k = 0; k < BT_N_OF(body_columns) && status == BT_OK; k++) {
         bt_state_row in_row = body_columns[k];
         const size_t bytes = bt_item_size(in_row.type) * (size_t)in_row.width, width = (bytes + 7) / 8;
         double *mine = bt_alloc((size_t)n, width * sizeof *mine), *all = bt_alloc((size_t)count, width * sizeof *all);
@@ -420,7 +330,7 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
 static void load_bodies(bt_world *w, bt_snapshot *s)
 {
     int64_t n = w->bodies.n_global;
-    body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
+    body_row *rows = load_columns(s, "bodies", body_columns, BT_N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++)
         if (!w->bodies.gone[g]) put_row(w, bt_world_index(w, g), &rows[g]);
     free(rows);
@@ -431,7 +341,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 static void save_splitting(const bt_splitting *p, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
-    save_columns(s, "splits", split_columns, N_OF(split_columns), p->split, sizeof *p->split, p->n);
+    save_columns(s, "splits", split_columns, BT_N_OF(split_columns), p->split, sizeof *p->split, p->n);
     bt_snapshot_add(s, "splits/vertices", BT_ITEM_F64, p->n_vertices, 2, p->vertex);
 }
 
@@ -441,7 +351,7 @@ static void load_splitting(bt_world *w, bt_snapshot *s)
     bt_splitting *p = w->splitting;
     int64_t n = -1, n_vertices = 0, at = 0;
     bt_snapshot_take_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
-    bt_split_record *rows = load_columns(s, "splits", split_columns, N_OF(split_columns), sizeof *rows, &n);
+    bt_split_record *rows = load_columns(s, "splits", split_columns, BT_N_OF(split_columns), sizeof *rows, &n);
     double *vertex = bt_snapshot_copy(s, "splits/vertices", BT_ITEM_F64, 2, &n_vertices);
     if (!s->faulty) bt_state_check_splits(w, rows, n, vertex, n_vertices, s);
     for (int64_t k = 0; k < n && !s->faulty; k++) {
@@ -459,7 +369,7 @@ enum { MEMORY_WIDTH = sizeof(bt_memory) / sizeof(double) };
 _Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a record is a row of doubles");
 
 #define MEMORY(label, type, width, member, units, axes, check, meaning) \
-    MEMBER(bt_memory, label, type, width, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(bt_memory, label, type, width, member, units, axes, check, meaning)
 static const bt_state_row memory_columns[] = {
     MEMORY("a", I64, 1, a, "1", "contact", ANY, "id of the first body of each contact"),
     MEMORY("b", I64, 1, b, "1", "contact", ANY, "id of the second body of each contact"),
@@ -551,7 +461,7 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
     if (c->rank == 0) {
         if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&memory[k]);
-        save_columns(s, "contacts", memory_columns, N_OF(memory_columns), memory, sizeof *memory, all);
+        save_columns(s, "contacts", memory_columns, BT_N_OF(memory_columns), memory, sizeof *memory, all);
         char *laws = added_laws(w);
         if (*laws) bt_snapshot_add_text(s, ADDED_LAWS, laws);
         free(laws);
@@ -562,7 +472,7 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 // --- collisions, events ----------------------------------------------------------------------------------------------
 
 #define EVENT(member, type, units, axes, check, meaning) \
-    MEMBER(bt_event, #member, type, 1, member, units, axes, check, meaning)
+    BT_STATE_MEMBER(bt_event, #member, type, 1, member, units, axes, check, meaning)
 static const bt_state_row event_columns[] = {
     EVENT(time, F64, "s", "time", FINITE, "end of the step of each event"),
     EVENT(kind, I64, "1", "time", ANY, "kind of each event"),
@@ -581,17 +491,17 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     char *forces = added_forces(w->forces);
     if (*forces) bt_snapshot_add_text(s, ADDED_FORCES, forces);
     free(forces);
-    bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
+    bt_snapshot_add_rows(s, "world", world_rows, BT_N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
-    bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
-    if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
-    if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    bt_snapshot_add_rows(s, "step", par_rows, BT_N_OF(par_rows), &w->par);
+    bt_snapshot_add_rows(s, "cells", cells_rows, BT_N_OF(cells_rows), w->cells);
+    if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, BT_N_OF(tow_rows), w->tow);
+    if (w->window) bt_snapshot_add_rows(s, "window", window_rows, BT_N_OF(window_rows), w->window);
     if (w->undisturbed)
-        bt_snapshot_add_rows(s, "undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
+        bt_snapshot_add_rows(s, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed);
     if (w->splitting) save_splitting(w->splitting, s);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
-    save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event,
+    save_columns(s, "events", event_columns, BT_N_OF(event_columns), w->events.event, sizeof *w->events.event,
                  w->events.n);
     return status;
 }
@@ -615,16 +525,17 @@ static bool open_finite(const bt_impact_open *o)
 {
     const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,
                            o->so_far.mass, o->so_far.thickness, o->rest,     o->largest};
-    return bt_state_finite(real, N_OF(real));
+    return bt_state_finite(real, BT_N_OF(real));
 }
 
 const char *bt_state_not_finite(const bt_world *w, char name[64])
 {
-    const char *found = rows_not_finite("world", world_rows, N_OF(world_rows), w, name);
-    if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
-    if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
-    if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
-    if (!found) found = rows_not_finite("undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed, name);
+    const char *found = rows_not_finite("world", world_rows, BT_N_OF(world_rows), w, name);
+    if (!found) found = rows_not_finite("step", par_rows, BT_N_OF(par_rows), &w->par, name);
+    if (!found) found = rows_not_finite("tow", tow_rows, BT_N_OF(tow_rows), w->tow, name);
+    if (!found) found = rows_not_finite("window", window_rows, BT_N_OF(window_rows), w->window, name);
+    if (!found)
+        found = rows_not_finite("undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed, name);
     const bt_impacts *m = w->impacts;
     if (found || !m) return found;
     if (!bt_state_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
@@ -651,16 +562,16 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 {
     const bt_params made = w->par;
     if (!s->path) s->path = "checkpoint";
-    bt_snapshot_take_rows(s, "world", world_rows, N_OF(world_rows), w);
+    bt_snapshot_take_rows(s, "world", world_rows, BT_N_OF(world_rows), w);
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
-    bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
+    bt_snapshot_take_rows(s, "step", par_rows, BT_N_OF(par_rows), &w->par);
     if (w->splitting && !s->faulty) load_splitting(w, s);
     load_bodies(w, s);
-    bt_snapshot_take_rows(s, "cells", cells_rows, N_OF(cells_rows), w->cells);
-    if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
-    if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    bt_snapshot_take_rows(s, "cells", cells_rows, BT_N_OF(cells_rows), w->cells);
+    if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, BT_N_OF(tow_rows), w->tow);
+    if (w->window) bt_snapshot_take_rows(s, "window", window_rows, BT_N_OF(window_rows), w->window);
     if (w->undisturbed)
-        bt_snapshot_take_rows(s, "undisturbed", undisturbed_rows, N_OF(undisturbed_rows), w->undisturbed);
+        bt_snapshot_take_rows(s, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed);
     if (w->impacts && c->rank == 0) {
         free(w->impacts->open);
         w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);
@@ -668,12 +579,12 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     bt_events_free(&w->events);
     w->events.n = -1;
     w->events.event =
-        load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
+        load_columns(s, "events", event_columns, BT_N_OF(event_columns), sizeof *w->events.event, &w->events.n);
     w->events.cap = w->events.n;
     int64_t n = -1;
     if (!s->faulty) check_added_laws(w, s);
     if (!s->faulty) load_added_forces(w->forces, s);
-    bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
+    bt_memory *memory = load_columns(s, "contacts", memory_columns, BT_N_OF(memory_columns), sizeof *memory, &n);
     if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
@@ -695,107 +606,4 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
                   "; go on with the program that wrote it",
                   s->path, hash);
     return BT_ERR_NUMERIC;
-}
-
-// --- the field -------------------------------------------------------------------------------------------------------
-
-/// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
-static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
-                               bt_errors *err)
-{
-    enum { FLOES = 1024 }; // at a time
-    const bt_bodies *b = &w->bodies;
-    const bt_splitting *p = w->splitting;
-    int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that is gone, 0 = none
-    double most = 0;
-    for (bt_idx i = 0; i < b->n; i++)
-        if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
-    for (int64_t k = 0; p && k < p->n; k++) {
-        if (p->split[k].parent >= n) continue;
-        split[p->split[k].parent] = k + 1;
-        most = bt_max(most, (double)p->split[k].corners[2]);
-    }
-    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
-    const size_t width = 2 * (size_t)most, size = width * sizeof(double);
-    double *mine = bt_alloc(FLOES, size), *all = bt_alloc(FLOES, size), *packed = bt_alloc(FLOES, size);
-    bt_gid *gid = bt_alloc(FLOES, sizeof *gid);
-    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
-    bt_status status = BT_OK;
-    if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
-    if (c->rank == 0 && n == 0) bt_snapshot_put(s, 0, packed);
-    for (bt_gid from = 0; from < n && status == BT_OK; from += FLOES) {
-        const bt_gid end = n - from < FLOES ? n : from + FLOES;
-        bt_idx own = 0;
-        for (bt_gid g = from; g < end; g++) {
-            const bt_idx i = bt_world_index(w, g);
-            const bool gone = split[g] > 0;
-            if (gone ? c->rank != 0 : i < 0 || !bt_domain_owns(w, i)) continue;
-            const double *v = gone ? bt_splitting_outline(p, split[g] - 1, 2) : b->vertices + 2 * b->offset[i];
-            const int corners = gone ? (int)p->split[split[g] - 1].corners[2] : bt_body_corners(b, i);
-            memcpy(mine + (size_t)own * width, v, 2 * sizeof *mine * (size_t)corners);
-            gid[own++] = g;
-        }
-        first[0] = from;
-        for (int k = 1; k <= c->size; k++) first[k] = end; // all to rank 0
-        status = bt_comm_rows_by_gid(c, first, own, gid, (int)width, mine, all, err);
-        if (status != BT_OK || c->rank != 0) continue;
-        for (bt_gid g = from; g < end; g++)
-            memcpy(packed + 2 * (offset[g] - offset[from]), all + (size_t)(g - from) * width,
-                   2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
-        bt_snapshot_put(s, offset[end] - offset[from], packed);
-    }
-    free(mine);
-    free(all);
-    free(packed);
-    free(gid);
-    free(first);
-    free(split);
-    return status;
-}
-
-static void save_field_head(const bt_field *f, bt_snapshot *s)
-{
-    bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
-    bt_snapshot_add_text(s, "field/crs", f->outlines.crs);
-    bt_snapshot_add_text(s, "field/nearly", f->outlines.nearly);
-    bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
-}
-
-bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
-{
-    double n = c->rank == 0 ? f->n : 0;
-    bt_comm_reduce(c, NULL, 0, &n, 1, NULL, 0);
-    if (c->rank == 0) save_field_head(f, s);
-    const bt_status status = save_outlines(w, c, (bt_gid)n, f->offsets, s, err);
-    if (c->rank != 0) return status;
-    bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
-    bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
-    bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
-    return status;
-}
-
-void bt_state_load_field(bt_field *f, bt_snapshot *s)
-{
-    bt_field_free(f);
-    bt_field_init(f);
-    int64_t n = 0, n_vertices = 0;
-    bt_snapshot_take_rows(s, "field", field_rows, N_OF(field_rows), f);
-    snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "field/crs"));
-    snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "field/nearly"));
-    free(f->offsets);
-    f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
-    f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
-    double **const arrays[] = {&f->pose, &f->thickness, &f->area};
-    static const char *const names[] = {"field/pose", "field/thickness", "field/area"};
-    for (int k = 0; k < 3; k++) {
-        int64_t rows = 0;
-        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
-        bt_snapshot_want(s, rows == n - 1, names[k], -1, "has not a row for each floe");
-    }
-    if (!s->faulty) f->n = f->cap = (bt_idx)(n - 1);
-    f->cap_vertices = n_vertices;
-    bt_state_check_field(f, n, n_vertices, s);
-    if (!s->faulty) return;
-    bt_field_free(f); // nothing of it is to be trusted
-    bt_field_init(f);
 }

@@ -40,6 +40,16 @@ void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s);
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s);
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s);
 
+// --- rows of members (private to state.c and state_field.c) ----------------------------------------------------------
+
+/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it
+/// by itself. What members must be to each other: state_check.c.
+#define BT_STATE_MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
+    {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_, NULL}
+#define BT_STATE_ONE(struct_, label, type_, member, units_, check_, meaning_) \
+    BT_STATE_MEMBER(struct_, label, type_, 1, member, units_, "one", check_, meaning_)
+#define BT_N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
+
 // --- its check -------------------------------------------------------------------------------------------------------
 
 // Is what was taken from a checkpoint a state that steps can leave? (private to state.c)

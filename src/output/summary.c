@@ -18,7 +18,7 @@
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_tow.h"
-#include "case/case_idle.h"
+#include "case/constraints.h"
 #include "case/ice_bounds.h"
 #include "case/warning.h"
 #include "estimate/packing.h"

@@ -232,14 +232,14 @@ static void imbalance(bt_world *w, bt_islands *s)
 }
 
 /// Strike out islands whose A is no more than `speed` times their sum.
-static void keep_above(bt_world *w, bt_islands *s, double speed)
+static void drop_islands_below(bt_world *w, bt_islands *s, double speed)
 {
     for (bt_idx i = 0; i < w->bodies.n; i++)
         if (!(s->share[i] > speed * bt_sum_value(&s->sum[i]))) s->share[i] = 0;
 }
 
 /// Strike out islands that close by no more than the tolerance.
-static void keep_closing(bt_world *w, bt_islands *s, const loads *l)
+static void drop_islands_not_closing(bt_world *w, bt_islands *s, const loads *l)
 {
     bt_islands_clear(w, s);
     for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
@@ -247,11 +247,11 @@ static void keep_closing(bt_world *w, bt_islands *s, const loads *l)
         bt_sum_add(&s->sum[bt_islands_of(w, s, u)], u->ln[0] + u->ln[1]);
     }
     bt_islands_add(w, s);
-    keep_above(w, s, w->par.tolerance);
+    drop_islands_below(w, s, w->par.tolerance);
 }
 
 /// Strike out islands whose loads are not those that the sweeps have come to.
-static void keep_near(bt_world *w, bt_islands *s, const loads *l)
+static void drop_islands_moved(bt_world *w, bt_islands *s, const loads *l)
 {
     bt_islands_clear(w, s);
     for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
@@ -270,7 +270,7 @@ static void mark(bt_world *w, bt_islands *s, const loads *l, double speeds)
     form_change(w, l);
     power_of_closing(w, s, l);
     imbalance(w, s);
-    keep_above(w, s, speeds * l->closing);
+    drop_islands_below(w, s, speeds * l->closing);
 }
 
 /// Is an island marked, and one that presses on the towed body?
@@ -308,8 +308,8 @@ static bt_lock by_balance(bt_world *w, bt_islands *s, const loads *found, bool h
     take_friction(w, &l, held);
     balance(w, &l);
     mark(w, s, &l, held ? BT_LOCKED_HELD_SPEEDS : BT_LOCKED_SPEEDS);
-    keep_closing(w, s, &l);
-    if (held) keep_near(w, s, &l);
+    drop_islands_not_closing(w, s, &l);
+    if (held) drop_islands_moved(w, s, &l);
     free(l.contact);
     return marked(w, s, found);
 }

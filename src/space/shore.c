@@ -65,7 +65,7 @@ static int along_y(const void *p, const void *q)
     return x != y ? (x < y ? -1 : 1) : a->gid != b->gid ? (a->gid < b->gid ? -1 : 1) : a->part - b->part;
 }
 
-static void grow(bt_shore *s, int node, int begin, int end)
+static void build_node(bt_shore *s, int node, int begin, int end)
 {
     box b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     for (int i = begin; i < end; i++)
@@ -78,15 +78,15 @@ static void grow(bt_shore *s, int node, int begin, int end)
     const bool long_x = b.high[0] - b.low[0] >= b.high[1] - b.low[1];
     qsort(s->polygon + begin, (size_t)(end - begin), sizeof *s->polygon, long_x ? along_x : along_y);
     const int middle = begin + (end - begin) / 2;
-    grow(s, 2 * node + 1, begin, middle);
-    grow(s, 2 * node + 2, middle, end);
+    build_node(s, 2 * node + 1, begin, middle);
+    build_node(s, 2 * node + 2, middle, end);
 }
 
-static void plant(bt_shore *s)
+static void build_tree(bt_shore *s)
 {
     free(s->node);
     s->node = bt_alloc(4 * (size_t)s->n + 4, sizeof *s->node);
-    if (s->n > 0) grow(s, 0, 0, s->n);
+    if (s->n > 0) build_node(s, 0, 0, s->n);
 }
 
 static bool boxes_meet(const double low[2], const double high[2], const double other_low[2],
@@ -346,7 +346,7 @@ static void collect(const bt_world *w, bt_shore *s)
             }
         }
     }
-    plant(s);
+    build_tree(s);
 }
 
 void bt_shore_create(bt_world *w)
@@ -377,7 +377,7 @@ void bt_shore_create(bt_world *w)
         bt_shore_free(s);
         return;
     }
-    plant(s);
+    build_tree(s);
     s->face = bt_alloc((size_t)n_faces, sizeof *s->face);
     for (int k = 0; k < s->n; k++) {
         c.of = &s->polygon[k];

@@ -210,7 +210,7 @@ static void add_side(const bt_world *w, const bt_cell *cell, bt_idx j, const cen
 static double most_of(const bt_world *w, const bt_contact *u)
 {
     const double total = u->ln[0] + u->ln[1];
-    const bt_collision q = bt_collision_of(w, u);
+    const bt_collision q = bt_contact_collision(w, u);
     double force = total / w->par.dt;
     if (is_collision(w, &q)) force += w->splitting->rule.real_corner ? INFINITY : peak_of(w, u, &q, NAN);
     const bool pair = (u->n == 1 || u->ln[0] == 0 || u->ln[1] == 0) &&
@@ -253,7 +253,7 @@ static void add_cell(bt_world *w, const bt_cell *cell, pass what, load_list *to)
                    of_b = may_split(w, u->b) && is_listed(w, u->b, what, most);
         if (!a && !of_b) continue;
         const centre c = centre_of(w, cell, j);
-        const bt_collision q = bt_collision_of(w, u);
+        const bt_collision q = bt_contact_collision(w, u);
         if (a) add_side(w, cell, j, &c, &q, false, to);
         if (of_b) add_side(w, cell, j, &c, &q, true, to);
     }

@@ -126,7 +126,7 @@ REFUSED = {
     "value of the base": ({"near": "base: far.yml\ntow: {speed: 1}\n", "far": "run: {dt: 0.1, duration: -1}\n"}, CASE,
                           "far.yml:1: run.duration: -1 is out of range"),
     "value across files": ({"near": "base: far.yml\nice: {x_max: 90}\n", "far": "run: {dt: 0.1, duration: 1}\n"}, CASE,
-                           "near.yml:2: ice.x_max: 90 m is outside the domain"),
+                           "near.yml:2: ice.x_max: 90 m is more than the high end of the domain"),
     "twice in one file": ({"near": "base: far.yml\ntow: {speed: 1}\ntow.speed: 2\n",
                            "far": "run: {dt: 0.1, duration: 1}\n"}, CASE, "near.yml:3: tow.speed: duplicate key"),
     "base of a section": ({"near": "tow: {base: far.yml}\n"}, CASE, "near.yml:1: tow.base: unknown key"),

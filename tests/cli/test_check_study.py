@@ -126,7 +126,7 @@ with:
 """, CASE)
     assert len(found) == 2, found  # each fault once, though it is of several conditions
     assert re.search(
-        r"base\.yml:\d+: output\.window_start: 5 s is not before the end .*; give an earlier time \(condition 4: "
+        r"base\.yml:\d+: output\.window_start: 5 s is not below run\.duration, .*; give an earlier time \(condition 4: "
         r"run\.duration 3, tow\.speed 0\.1; and 2 more\)$",
         found[1]), found
     assert re.search(r"base\.yml:\d+: body\.length: .* \(condition 3: run\.duration 8, tow\.speed 0\.3; and 1 more\)$",

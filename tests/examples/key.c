@@ -13,6 +13,6 @@ enum { N_PILOT_KEYS = 2 };
 static inline double pilot_reserve(const bt_case *c)
 {
     double own[N_PILOT_KEYS];
-    bt_keys_values(c, "pilot", pilot_keys, N_PILOT_KEYS, own);
+    bt_keys_get(c, "pilot", pilot_keys, N_PILOT_KEYS, own);
     return own[0] - own[1] - c->body.draft;
 }

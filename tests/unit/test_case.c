@@ -355,7 +355,7 @@ static void overrides_replace_the_file_and_are_named_in_errors(void **state)
     // a check across keys names the override, too
     const char *longer[] = {"run.dt=20"};
     assert_int_equal(read_text_with(&c, base, longer, 1, &err), BT_ERR_CASE);
-    if (!has(&err, "--set run.dt=20: 20 s is longer than run.duration")) fail_with(&err, "cross check");
+    if (!has(&err, "--set run.dt=20: 20 s is more than run.duration")) fail_with(&err, "cross check");
     bt_errors_free(&err);
     bt_case_free(&c);
 }

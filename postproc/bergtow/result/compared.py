@@ -119,7 +119,7 @@ def stale(found, e):
     return "" if then == now["finished"] else f"of {then} members, while {now['finished']} have finished"
 
 
-def _beside(found, texts):
+def _physical_values(found, texts):
     """(key, its text in the result, its texts in the members' cases) of the keys that make another case."""
     for key, value in (found.get("values") or {}).items():
         some = list(dict.fromkeys(text[key] for text in texts if key in text))
@@ -138,7 +138,7 @@ def _among(value, some):
 def misfit(found, texts):
     """Why a result belongs to another case than the members (texts of cases()): a key of the ice, the body, the tow,
     water or air has a value that none of them has. "" if it belongs to them, or does not name its case."""
-    for key, value, some in _beside(found, texts):
+    for key, value, some in _physical_values(found, texts):
         if not _among(value, some):
             return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
     return ""
@@ -147,5 +147,5 @@ def misfit(found, texts):
 def alone(found, texts):
     """The values of a result where the members have several: "ice.concentration 0.8"; "" if the members have no
     others."""
-    return ", ".join(f"{key} {value}" for key, value, some in _beside(found, texts)
+    return ", ".join(f"{key} {value}" for key, value, some in _physical_values(found, texts)
                      if any(_differ(value, text) for text in some))

@@ -309,7 +309,7 @@ def course_change(t, runs, degrees, radius):
                set=sets, formula="tension" if tension else "hypot", values=values | {"along_n": along})
 
 
-def with_steady(t, n, ends, r):
+def combined_interval(t, n, ends, r):
     """The interval of a changed load with that of the steady tow in it, whose sides change by R'/R: the root of the
     squares of either; None where one of the two is not known."""
     if not np.isfinite(ends).all() or t.interval is None or np.isnan(t.interval).any():
@@ -348,7 +348,7 @@ def head_sea(t, runs, current=None, wind=None):
     n, ends, parts = changed(t, base, other)
     largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
     return row("head_sea", n, "changed", "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
-               interval_95=with_steady(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
+               interval_95=combined_interval(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
 
 
 # ---- ranges

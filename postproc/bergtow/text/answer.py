@@ -167,12 +167,12 @@ def _start(v, a):
     return out
 
 
-def _beside(v, a):
+def _against_weather(v, a):
     return (f"Against a current of {short(v['current_m_s'])} m/s and a wind of {short(v['wind_m_s'])} m/s, which are "
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
-WORDS = {"beside": _beside, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest,
          "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
          "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+// The parts of a run beside its world as named arrays: the ice field at time zero, its lead, and what tells that the
+// body stands still.
+#include "output/state.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "partition/domain.h"
+#include "step/splitting.h"
+
+#define STALL(type, member, units, check, meaning) \
+    BT_STATE_ONE(bt_stall, #member, type, member, units, check, meaning)
+static const bt_state_row stall_rows[] = {
+    STALL(I64, windows, "1", COUNT, "windows of time in which the body stood still"),
+    STALL(F64, time, "s", FINITE, "time of these"),
+    STALL(F64, asked, "m", FINITE, "way asked for in the window under way"),
+    STALL(F64, spent, "s", FINITE, "time spent in it"),
+    STALL(F64, from_x, "m", FINITE, "where the body was at its beginning, x"),
+    STALL(F64, from_y, "m", FINITE, "where the body was at its beginning, y"),
+    STALL(U8, begun, "1", ANY, "1 = such a window is under way"),
+    STALL(F64, ice, "N s", FINITE, "impulse of the ice against the tow in it"),
+    STALL(F64, pull, "N s", FINITE, "impulse of the tow in it"),
+    STALL(F64, inside, "s", ANY, "time for which the towing end was within the hull, after it had been outside"),
+    STALL(F64, inside_from, "s", ANY, "when it first was"),
+    STALL(U8, outside, "1", ANY, "1 = the towing end has been outside the hull"),
+};
+
+#define LEAD(type, member, units, check, meaning) \
+    BT_STATE_ONE(bt_lead_stats, #member, type, member, units, check, meaning)
+static const bt_state_row lead_rows[] = {
+    LEAD(I32, mode, "1", ANY, "kind of the lead ahead of the body"),
+    LEAD(F64, width, "m", ANY, "its width"),
+    LEAD(F64, length, "m", ANY, "its length"),
+    LEAD(I64, taken, "1", ANY, "floes taken out of it"),
+    LEAD(F64, area_taken, "m2", ANY, "their area"),
+    LEAD(I64, pieces, "1", ANY, "pieces that were put into it"),
+    LEAD(F64, mean_piece, "m", ANY, "their mean size"),
+    LEAD(F64, concentration_before, "1", ANY, "concentration of the ice before the lead was made"),
+    LEAD(F64, concentration_after, "1", ANY, "concentration of the ice after it"),
+};
+
+#define FIELD(type, label, member, units, check, meaning) \
+    BT_STATE_ONE(bt_field, label, type, member, units, check, meaning)
+static const bt_state_row field_rows[] = {
+    FIELD(F64, "ice_area", ice_area, "m2", ANY, "area that the concentration of the field refers to"),
+    FIELD(F64, "concentration", concentration, "1", ANY, "share of the ice region that they cover"),
+    FIELD(I64, "read", outlines.read, "1", COUNT, "outlines that were read"),
+    FIELD(I64, "turned", outlines.turned, "1", COUNT, "outlines that ran clockwise"),
+    FIELD(I64, "dropped", outlines.dropped, "1", COUNT, "outlines that were dropped"),
+    FIELD(I64, "hulled", outlines.hulled, "1", COUNT, "outlines that were replaced by their hull"),
+    FIELD(F64, "hull_area", outlines.hull_area, "m2", ANY, "area that the hulls added"),
+    FIELD(I64, "split", outlines.split, "1", COUNT, "outlines that were split into convex parts"),
+    FIELD(I64, "parts", outlines.parts, "1", COUNT, "parts of these"),
+    FIELD(F64, "lon", outlines.lon, "rad", ANY, "longitude of the origin of the map"),
+    FIELD(F64, "lat", outlines.lat, "rad", ANY, "latitude of the origin of the map"),
+    FIELD(I64, "rounded", outlines.rounded, "1", COUNT, "floes not convex by rounding alone, taken for convex"),
+    FIELD(I64, "rounded_corners", outlines.rounded_corners, "1", COUNT, "corners that this left out"),
+    FIELD(F64, "rounded_area", outlines.rounded_area, "m2", ANY, "area that it added"),
+    FIELD(F64, "east", outlines.east, "m", ANY, "origin in the map, east"),
+    FIELD(F64, "north", outlines.north, "m", ANY, "origin in the map, north"),
+    FIELD(I64, "unnamed", outlines.unnamed, "1", COUNT,
+        "features without a thickness that have a property of nearly this name"),
+    FIELD(I64, "bare", outlines.bare, "1", ANY, "features without a thickness"),
+    FIELD(I64, "outside", outlines.outside, "1", ANY, "floes whose centroid is outside the ice region"),
+    FIELD(F64, "outside_area", outlines.outside_area, "m2", ANY, "area of floes outside the ice region"),
+    FIELD(F64, "own_area", outlines.own_area, "m2", ANY, "area that the concentration of a field file refers to"),
+    FIELD(F64, "region_area", outlines.region_area, "m2", ANY, "area of the case's ice region, beside it"),
+    FIELD(F64, "x_min", outlines.region[0], "m", ANY, "ice region of a field file, 0 as the other three for others"),
+    FIELD(F64, "y_min", outlines.region[1], "m", ANY, "the same, y"),
+    FIELD(F64, "x_max", outlines.region[2], "m", ANY, "its other end, x"),
+    FIELD(F64, "y_max", outlines.region[3], "m", ANY, "the same, y"),
+};
+
+_Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
+
+void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "stall", stall_rows, BT_N_OF(stall_rows), t);
+}
+void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
+{
+    bt_snapshot_take_rows(s, "stall", stall_rows, BT_N_OF(stall_rows), t);
+}
+void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "lead", lead_rows, BT_N_OF(lead_rows), l);
+}
+void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
+{
+    int32_t mode = 0;
+    bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
+    // before it is taken as one
+    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
+    if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, BT_N_OF(lead_rows), l);
+}
+
+// --- the field -------------------------------------------------------------------------------------------------------
+
+/// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
+static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
+                               bt_errors *err)
+{
+    enum { FLOES = 1024 }; // at a time
+    const bt_bodies *b = &w->bodies;
+    const bt_splitting *p = w->splitting;
+    int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that is gone, 0 = none
+    double most = 0;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
+    for (int64_t k = 0; p && k < p->n; k++) {
+        if (p->split[k].parent >= n) continue;
+        split[p->split[k].parent] = k + 1;
+        most = bt_max(most, (double)p->split[k].corners[2]);
+    }
+    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    const size_t width = 2 * (size_t)most, size = width * sizeof(double);
+    double *mine = bt_alloc(FLOES, size), *all = bt_alloc(FLOES, size), *packed = bt_alloc(FLOES, size);
+    bt_gid *gid = bt_alloc(FLOES, sizeof *gid);
+    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    bt_status status = BT_OK;
+    if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
+    if (c->rank == 0 && n == 0) bt_snapshot_put(s, 0, packed);
+    for (bt_gid from = 0; from < n && status == BT_OK; from += FLOES) {
+        const bt_gid end = n - from < FLOES ? n : from + FLOES;
+        bt_idx own = 0;
+        for (bt_gid g = from; g < end; g++) {
+            const bt_idx i = bt_world_index(w, g);
+            const bool gone = split[g] > 0;
+            if (gone ? c->rank != 0 : i < 0 || !bt_domain_owns(w, i)) continue;
+            const double *v = gone ? bt_splitting_outline(p, split[g] - 1, 2) : b->vertices + 2 * b->offset[i];
+            const int corners = gone ? (int)p->split[split[g] - 1].corners[2] : bt_body_corners(b, i);
+            memcpy(mine + (size_t)own * width, v, 2 * sizeof *mine * (size_t)corners);
+            gid[own++] = g;
+        }
+        first[0] = from;
+        for (int k = 1; k <= c->size; k++) first[k] = end; // all to rank 0
+        status = bt_comm_rows_by_gid(c, first, own, gid, (int)width, mine, all, err);
+        if (status != BT_OK || c->rank != 0) continue;
+        for (bt_gid g = from; g < end; g++)
+            memcpy(packed + 2 * (offset[g] - offset[from]), all + (size_t)(g - from) * width,
+                   2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
+        bt_snapshot_put(s, offset[end] - offset[from], packed);
+    }
+    free(mine);
+    free(all);
+    free(packed);
+    free(gid);
+    free(first);
+    free(split);
+    return status;
+}
+
+static void save_field_head(const bt_field *f, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "field", field_rows, BT_N_OF(field_rows), f);
+    bt_snapshot_add_text(s, "field/crs", f->outlines.crs);
+    bt_snapshot_add_text(s, "field/nearly", f->outlines.nearly);
+    bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
+}
+
+bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    double n = c->rank == 0 ? f->n : 0;
+    bt_comm_reduce(c, NULL, 0, &n, 1, NULL, 0);
+    if (c->rank == 0) save_field_head(f, s);
+    const bt_status status = save_outlines(w, c, (bt_gid)n, f->offsets, s, err);
+    if (c->rank != 0) return status;
+    bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
+    bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
+    bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
+    return status;
+}
+
+void bt_state_load_field(bt_field *f, bt_snapshot *s)
+{
+    bt_field_free(f);
+    bt_field_init(f);
+    int64_t n = 0, n_vertices = 0;
+    bt_snapshot_take_rows(s, "field", field_rows, BT_N_OF(field_rows), f);
+    snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "field/crs"));
+    snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "field/nearly"));
+    free(f->offsets);
+    f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
+    f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
+    double **const arrays[] = {&f->pose, &f->thickness, &f->area};
+    static const char *const names[] = {"field/pose", "field/thickness", "field/area"};
+    for (int k = 0; k < 3; k++) {
+        int64_t rows = 0;
+        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
+        bt_snapshot_want(s, rows == n - 1, names[k], -1, "has not a row for each floe");
+    }
+    if (!s->faulty) f->n = f->cap = (bt_idx)(n - 1);
+    f->cap_vertices = n_vertices;
+    bt_state_check_field(f, n, n_vertices, s);
+    if (!s->faulty) return;
+    bt_field_free(f); // nothing of it is to be trusted
+    bt_field_init(f);
+}
