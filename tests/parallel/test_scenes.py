@@ -16,9 +16,7 @@ from harness import BERGTOW, DONE
 RECORDED_WITH, STORED = scenes.stored()
 
 # Keys that no scene sets, and why.
-LEFT_OUT = {
-    "run.threads": "said by the layout", "output.progress": "what is printed while a run is on",
-}
+LEFT_OUT = {"run.threads": "said by the layout", "output.progress": "what is printed while a run is on", }
 
 
 def both():

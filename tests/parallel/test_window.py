@@ -25,18 +25,11 @@ SPEED = {
     "output": {"frame_interval": 8},
 }
 # On a line, the other way, in the geographic frame, under every force: the field drifts.
-LINE = changed(SPEED,
-               domain__frame="geographic",
-               domain__sides="wall",
-               domain__ahead=14,
-               domain__width=14,
-               ice__concentration=0.35,
-               ice__restitution=0,
-               ice__seed=3,
-               tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 10e3,
-                    "line_damping": 100, "direction": 180},
-               water={"latitude": 75, "current_x": 0.1},
-               air={"wind_x": 5, "wind_y": 3})
+LINE = changed(SPEED, domain__frame="geographic", domain__sides="wall", domain__ahead=14, domain__width=14,
+               ice__concentration=0.35, ice__restitution=0, ice__seed=3, tow={"mode": "line", "speed": 0.8, "ramp": 1,
+                                                                              "line_length": 3, "line_stiffness": 10e3,
+                                                                              "line_damping": 100, "direction": 180},
+               water={"latitude": 75, "current_x": 0.1}, air={"wind_x": 5, "wind_y": 3})
 CASES = {"speed": SPEED, "line": LINE}
 
 
@@ -81,10 +74,8 @@ def test_overlap_falls_faster_than_the_step(tmp_path):
     floe at whole and half steps."""
     deepest = []
     for dt in (0.125, 0.0625):
-        runs = [
-            run(tmp_path, changed(LINE, ice__seed=seed, run__dt=dt, run__duration=40), "--quiet", name=f"{dt}-{seed}")
-            for seed in range(1, 5)
-        ]
+        runs = [run(tmp_path, changed(LINE, ice__seed=seed, run__dt=dt, run__duration=40), "--quiet",
+                    name=f"{dt}-{seed}") for seed in range(1, 5)]
         assert all(r.summary["unconverged_steps"] == 0 for r in runs)
         deepest.append(np.mean([r.summary["max_overlap_relative"] for r in runs]))
     assert deepest[0] > 0.007 and deepest[1] < 0.5 * deepest[0]
@@ -144,11 +135,7 @@ def test_open_water_does_not_see_it(tmp_path):
 def test_no_lap_no_difference(tmp_path):
     """What is renewed is far from the body: at first the force is that in a periodic domain, but for the order of the
     contacts, within the tolerance of the solver."""
-    bare = changed(TOW,
-                   body__x=6,
-                   domain__sides="periodic",
-                   domain__length=30,
-                   run__duration=15,
+    bare = changed(TOW, body__x=6, domain__sides="periodic", domain__length=30, run__duration=15,
                    solver={"tolerance": 1e-8, "max_sweeps": 5000})
     still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
     assert moving.summary["moving_window"]["renewed"] > 3
