@@ -3,16 +3,10 @@
 #ifndef BT_CASE_TEXT_H
 #define BT_CASE_TEXT_H
 
-#include "bergtow/case.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
+
+#include "test.h"
+#include "bergtow/case.h"
 
 static char folder[] = "/tmp/bt_test_case_XXXXXX";
 static char path[64];

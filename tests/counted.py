@@ -17,10 +17,8 @@ def assert_counted_over_the_window(run):
     start, end = window["start_s"], window["end_s"]
     with h5py.File(run.dir / "result.h5") as f:
         rows = {name: d[:] for name, d in f["impacts"].items()}
-        series = {
-            name: f["series"][name][:]
-            for name in ("time", "ice_resistance", "collision_resistance", "largest_quasi_static_load")
-        }
+        series = {name: f["series"][name][:] for name in ("time", "ice_resistance", "collision_resistance",
+                                                          "largest_quasi_static_load")}
         panels, attributes = {name: d[:] for name, d in f["panels"].items()}, dict(f["panels"].attrs)
     late, steps = (rows["time"] >= start) & (rows["time"] <= end), (series["time"] >= start) & (series["time"] <= end)
     dt = run.summary["dt_s"]

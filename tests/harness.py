@@ -161,11 +161,12 @@ def call(*arguments, cwd=None, env=None, timeout=120, **more):
                           capture_output=True, text=True, timeout=timeout, **more)
 
 
-def script(name, *words, cwd=None, env=None, timeout=300):
-    """python3 -m bergtow NAME, or a script of Python by its path; it starts the program that is tested."""
+def script(name, *words, cwd=None, env=None, timeout=300, drawn=True):
+    """python3 -m bergtow NAME, or a script of Python by its path; it starts the program that is tested. Pages that are
+    not drawn say why in place of each picture, and cost a third."""
     import script_copy  # not before: it loads what most tests need nothing of
     env = (env or environment()) | {"BERGTOW": BERGTOW}
-    return script_copy.called([str(name), *map(str, words)], cwd, env, timeout)
+    return script_copy.called([str(name), *map(str, words)], cwd, env, timeout, drawn)
 
 
 def faulty(**what):

@@ -192,10 +192,7 @@ def call_on(program, *arguments, timeout=120):
     """One thread unless said otherwise; a leak is a finding, but for those of Open MPI."""
     env = environment(OMP_NUM_THREADS=1, ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=1",
                       LSAN_OPTIONS=f"suppressions={ROOT}/tests/lsan.supp:print_suppressions=0")
-    return subprocess.run([str(program), *map(str, arguments)],
-                          env=env,
-                          capture_output=True,
-                          text=True,
+    return subprocess.run([str(program), *map(str, arguments)], env=env, capture_output=True, text=True,
                           timeout=timeout)
 
 

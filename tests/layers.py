@@ -173,12 +173,8 @@ def wrapped(names, width=57, indent=61):
 
 
 def main():
-    listed = subprocess.run([
-        "git", "ls-files", "--cached", "--others", "--exclude-standard", "src/*.[ch]", "partition/*.[ch]", "include/*.h"
-    ],
-                            cwd=ROOT,
-                            capture_output=True,
-                            text=True,
+    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "src/*.[ch]",
+                             "partition/*.[ch]", "include/*.h"], cwd=ROOT, capture_output=True, text=True,
                             check=True).stdout.split()
     files = [f for f in sorted(set(listed)) if (ROOT / f).exists() and "/study/" not in f]
     called, included = calls(ROOT / "build/release"), includes(files)

@@ -43,10 +43,8 @@ def note(code, text="", **values):
 
 def described(name):
     """What the program says of an estimate beside its numbers."""
-    return {
-        "label": LABELS.get(name, name.replace("_", " ")),
-        "kind": "on top" if name == "open_water_drag" else "ice resistance"
-    }
+    return {"label": LABELS.get(name, name.replace("_", " ")),
+            "kind": "on top" if name == "open_water_drag" else "ice resistance"}
 
 
 def member(series, parameters, condition, **changes):
@@ -65,10 +63,8 @@ def numbers(m):
     """Nested numbers of summary.json."""
     x, start = m["series"], m["start"]
     steady = x[np.arange(1, len(x) + 1) >= start]
-    estimates = {
-        name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"}
-        for name, f in m["estimates"].items()
-    }
+    estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"} for name,
+                 f in m["estimates"].items()}
     return {
         "mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "events": [],
         "stalled_windows": 0, "concentration": 0.5, "window": {

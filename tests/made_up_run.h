@@ -3,19 +3,10 @@
 #ifndef BERGTOW_TESTS_MADE_UP_RUN_H
 #define BERGTOW_TESTS_MADE_UP_RUN_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-// cmocka.h wants setjmp.h, stdarg.h, stddef.h and stdint.h first
-#include <cmocka.h>
 #include <hdf5.h>
 
+#include "test.h"
 #include "output/record.h"
 
 static char folder[64];
@@ -205,14 +196,15 @@ static inline int64_t int_attribute(hid_t file, const char *object, const char *
 }
 
 /// Run the tests in a folder of their own under /tmp, removed at the end.
-#define RUN_IN_FOLDER(tests, failed)                                            \
-    do {                                                                        \
-        snprintf(folder, sizeof folder, "/tmp/bergtow-record-XXXXXX");          \
-        if (!mkdtemp(folder)) return 1;                                         \
-        failed = cmocka_run_group_tests(tests, NULL, NULL);                     \
-        char command[100];                                                      \
-        snprintf(command, sizeof command, "rm -rf %s", folder);                 \
-        if (system(command)) failed++;                                          \
-    } while (0)
+static inline int run_in_folder(void)
+{
+    snprintf(folder, sizeof folder, "/tmp/bergtow-record-XXXXXX");
+    if (!mkdtemp(folder)) return 1;
+    int failed = run_all_tests(NULL, NULL);
+    char command[100];
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    if (system(command)) failed++;
+    return failed;
+}
 
 #endif

@@ -36,13 +36,8 @@ def command(ranks, *arguments):
 
 def started(ranks, *arguments, cwd=None, stderr=subprocess.PIPE):
     """In a process group of its own, so that all of it can be killed at once."""
-    return subprocess.Popen(command(ranks, *arguments),
-                            cwd=cwd,
-                            env=environment(OMP_NUM_THREADS=1),
-                            stdout=subprocess.PIPE,
-                            stderr=stderr,
-                            text=True,
-                            start_new_session=True)
+    return subprocess.Popen(command(ranks, *arguments), cwd=cwd, env=environment(OMP_NUM_THREADS=1),
+                            stdout=subprocess.PIPE, stderr=stderr, text=True, start_new_session=True)
 
 
 def done(ranks, *arguments, cwd=None, code=DONE, timeout=300):

@@ -88,8 +88,8 @@ tested() {
 # Ranks that wait for one another want the cores: with other tests beside them they take ten times as long.
 # shellcheck disable=SC2046 # one word a file
 tested ranks ranks tests/parallel $(grep -l 'mark\.ranks' tests/cli/test_*.py)
-# those that take longest first
-first='tests/cli/test_\(properties\|random_cases\|design\)\.py'
+# Those that take longest first: a file stays with one worker, and one begun last is waited for.
+first='tests/cli/test_\(route\|docs\|design\|converge\|properties\|random_cases\|at_least\)\.py'
 files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"
     printf '%s\n' tests/parallel tests/cli/test_*.py | grep -v "$first")
 # one more than there are cores: what waits for a signal, a lock or a limit of time leaves a core to others

@@ -3,16 +3,7 @@
 #ifndef BERGTOW_TESTS_SCENE_H
 #define BERGTOW_TESTS_SCENE_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-// cmocka.h wants the five above first
-#include <cmocka.h>
-
+#include "test.h"
 #include "contact/contacts.h"
 #include "law_number.h"
 #include "space/cells.h"

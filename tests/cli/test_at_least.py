@@ -7,14 +7,13 @@ tows that ended for it without a word.
 import argparse
 import csv
 import json
-import subprocess
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, call, run, write_case
+from harness import call, run, script, write_case
 from test_locked import jam
 
 from bergtow.result import at_least  # noqa: E402
@@ -127,15 +126,11 @@ def test_pages_of_a_run_say_at_least(locked, tmp_path):
     points = [plot_resistance.read(locked.dir)]
     assert "90 % ice adds at least " in plot_resistance.words(points) and share in plot_resistance.words(points)
     assert "| at least " in plot_resistance.table(points) and share in plot_resistance.table(points)
-    for script in ("plot-resistance", "plot-force", "plot-impacts", "report"):
-        where = tmp_path / ("x.html" if script == "report" else f"{script}.svg")
-        drawn = script_of(script, locked.dir, "-o", where)
+    for name in ("plot-resistance", "plot-force", "plot-impacts", "report"):
+        where = tmp_path / ("x.html" if name == "report" else f"{name}.svg")
+        drawn = script(name, locked.dir, "-o", where)
         assert drawn.returncode == 0, drawn.stderr
-        assert "at least" in where.read_text(encoding="utf-8"), script
-
-
-def script_of(name, *arguments):
-    return subprocess.run([BERGTOW, name, *map(str, arguments)], capture_output=True, text=True)
+        assert "at least" in where.read_text(encoding="utf-8"), name
 
 
 def test_a_mean_of_runs_of_which_one_is_a_lower_bound_is_one():
@@ -202,13 +197,13 @@ def test_no_budget_and_no_capability_of_lower_bounds(tmp_path):
 
 def test_a_study_in_which_ice_locks(tmp_path):
     """From the program to the pages: a condition of tows with such steps, and one of tows that they end."""
-    write_case(tmp_path, jam(1, 0.9, run__duration=6))
+    write_case(tmp_path, jam(1, 0.9, run__duration=3))
     (tmp_path / "study.yml").write_text(json.dumps({
         "base": "case.yml", "repeats": 2, "parameters": {"ice.concentration": [0.5, 0.9],
                                                          "guard.no_solution": [0, 0.02]}}))
     call("ensemble", "study.yml", "-o", "out", "--threads", 1, cwd=tmp_path)
-    done = script_of("statistics", tmp_path / "out", "--partial", "--time-scale", 0.2, "--tow-hours", 0.001,
-                     "--resamples", 1)
+    done = script("statistics", tmp_path / "out", "--partial", "--time-scale", 0.2, "--tow-hours", 0.001,
+                  "--resamples", 1)
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "out/statistics.json").read_text())["conditions"]
     with open(tmp_path / "out/statistics.csv", newline="") as f:
@@ -226,5 +221,5 @@ def test_a_study_in_which_ice_locks(tmp_path):
     assert "at least " in lines["guard no solution 0, concentration 90 %"]
     assert ["at least " in line for line in lines.values()].count(True) == 1 + sum(least[:2])
     assert f"{100 * some['without_bound']['share']:.2g} % of the steps of all that finished" in done.stdout
-    page = script_of("report", tmp_path / "out", "-o", tmp_path / "page.html")
+    page = script("report", tmp_path / "out", "-o", tmp_path / "page.html")
     assert page.returncode == 0 and "at least these in" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -278,15 +278,8 @@ def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
 
     Newton's law of restitution alone gains energy where several contacts, or friction, act at once (Kane's paradox).
     """
-    r = run(
-        tmp_path,
-        changed(TOW,
-                tow__mode=mode,
-                ice__restitution=restitution,
-                ice__friction=friction,
-                solver__tolerance=1e-7,
-                ice__concentration=0.4,
-                solver__max_sweeps=3000))
+    r = run(tmp_path, changed(TOW, tow__mode=mode, ice__restitution=restitution, ice__friction=friction,
+                              solver__tolerance=1e-7, ice__concentration=0.4, solver__max_sweeps=3000))
     work = r.series("contact_work")
     assert work.min() < -1e-3, "nothing collided"
     assert work.max() <= 1e-5
@@ -332,11 +325,7 @@ def test_the_mean_does_not_hang_on_the_tolerance(tmp_path):
     two."""
     change, error = [], []
     for seed in (1, 2, 3, 4):
-        case = changed(TOW,
-                       ice__concentration=0.3,
-                       ice__seed=seed,
-                       run__duration=60,
-                       domain__length=16,
+        case = changed(TOW, ice__concentration=0.3, ice__seed=seed, run__duration=60, domain__length=16,
                        solver__max_sweeps=2000)
         a = run(tmp_path, case, name=f"a{seed}").summary
         b = run(tmp_path, changed(case, solver__tolerance=1e-4), name=f"b{seed}").summary
@@ -539,11 +528,7 @@ def test_coriolis_turns_right_in_the_north_and_left_in_the_south(tmp_path):
 
 def test_coriolis_in_the_basin_frame(tmp_path):
     """There y is to the left of x, seen from above: right is −y."""
-    case = changed(DRIFT,
-                   domain__frame="basin",
-                   domain__x0=-10000,
-                   body__x=0,
-                   air={"wind_x": 10},
+    case = changed(DRIFT, domain__frame="basin", domain__x0=-10000, body__x=0, air={"wind_x": 10},
                    water={"latitude": 75})
     r = run(tmp_path, case)
     x, y = r.series("body_x", "body_y")

@@ -18,15 +18,8 @@ import bench  # noqa: E402
 
 
 def start(*args):
-    return subprocess.run([
-        "/usr/bin/python3",
-        str(SCALING / "bench.py"), "--bergtow",
-        str(BERGTOW), "--triad",
-        str(TRIAD), *map(str, args)
-    ],
-                          capture_output=True,
-                          text=True,
-                          timeout=300)
+    return subprocess.run(["/usr/bin/python3", str(SCALING / "bench.py"), "--bergtow", str(BERGTOW), "--triad",
+                           str(TRIAD), *map(str, args)], capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture(scope="module")

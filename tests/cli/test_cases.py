@@ -55,10 +55,8 @@ def test_a_shipped_case_is_valid(path):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_number_of_a_case_says_where_it_is_from(name):
     """Every key has a mark [P], [R] or [A], but for the seed, the body's place, and words that choose a form."""
-    plain = {
-        "x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type",
-        "conversion"
-    }
+    plain = {"x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type",
+             "conversion"}
     marked = 0
     lists_on_one_line = re.sub(r"\],\n\s+\[", "], [", (FIELD / f"{name}.yml").read_text())
     for line in lists_on_one_line.splitlines():

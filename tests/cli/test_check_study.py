@@ -68,11 +68,8 @@ def test_the_study_in_numbers(tmp_path):
 
 
 def test_time_steps_that_are_too_large_are_reported(tmp_path):
-    head, table = rows(
-        checked(tmp_path, {
-            "base": "base.yml", "set": {"run.duration": 10},
-            "parameters": {"run.dt": [0.1, 0.2], "tow.speed": [0.1, 0.9]}
-        }))
+    head, table = rows(checked(tmp_path, {"base": "base.yml", "set": {"run.duration": 10},
+                                          "parameters": {"run.dt": [0.1, 0.2], "tow.speed": [0.1, 0.9]}}))
     # 0.9 m/s: an eighth of a floe in 0.1 s; 0.2 s: longer than a collision
     assert [row[-1] for row in table] == ["ok", "TOO LARGE", "TOO LARGE", "TOO LARGE"]
     assert [row[-3] for row in table] == ["100", "100", "50", "50"]
@@ -159,11 +156,8 @@ def test_faults_of_the_study_and_of_the_base_are_reported_once(tmp_path):
 
 def test_what_a_condition_reads_is_looked_at(tmp_path):
     (tmp_path / "there.csv").write_text("t,u,v\n0,0,0\n99,0.1,0\n")
-    study = {
-        "base": "base.yml", "variants": {
-            "still": {}, "table": {"water.current_table": "there.csv"}, "lost": {"water.current_table": "none.csv"}
-        }
-    }
+    study = {"base": "base.yml", "variants": {"still": {}, "table": {"water.current_table": "there.csv"},
+                                              "lost": {"water.current_table": "none.csv"}}}
     found = checked(tmp_path, study, IO)
     assert len(found) == 1 and "none.csv" in found[0] and found[0].endswith("(condition 3: variant lost)")
     call("field", "base.yml", "-o", "field.h5", cwd=tmp_path)
@@ -203,12 +197,8 @@ def test_under_mpirun_it_is_said_once(tmp_path):
     env = environment(OMP_NUM_THREADS=1)
     for study, code in (STUDY, DONE), (STUDY | {"base": "none.yml"}, IO):
         checked(tmp_path, study, code)
-        result = subprocess.run([*launcher(2), BERGTOW, "check", "study.yml"],
-                                cwd=tmp_path,
-                                env=env,
-                                capture_output=True,
-                                text=True,
-                                timeout=60)
+        result = subprocess.run([*launcher(2), BERGTOW, "check", "study.yml"], cwd=tmp_path, env=env,
+                                capture_output=True, text=True, timeout=60)
         assert result.returncode == code
         said = alone.splitlines() if code == DONE else []
         # what is said of the ranks comes on top

@@ -14,6 +14,7 @@ import yaml
 import made_up_ensemble as made_up
 from browser import browser, complaints, opened
 from harness import BERGTOW, TOW, call, changed, environment, script, write_case
+from script_copy import undrawn
 
 from bergtow import cli
 from bergtow import table as text_table
@@ -105,6 +106,8 @@ PERIODIC = changed(CASE, domain={"width": 5, "sides": "periodic"}, run__duration
 ])
 def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, case, more, wider):
     write_case(tmp_path, case)
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    monkeypatch.setattr(report_run, "picture", undrawn)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     out = tmp_path / "out"
     cli.perform("design", tmp_path / "case.yml", "-o", out, "--concentrations", "0.2,0.45", "--fields", "1",

@@ -42,10 +42,7 @@ def said(text, words):
 def run(folder, path, ranks, *more):
     command = launcher(ranks) if ranks > 1 else []
     result = subprocess.run([*command, BERGTOW, "run", path, "-o", folder, "--threads", "1", "--quiet", *more],
-                            env=environment(OMP_NUM_THREADS=1),
-                            capture_output=True,
-                            text=True,
-                            timeout=120)
+                            env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=120)
     assert result.returncode == DONE, result.stderr
     return left(folder)
 
@@ -75,11 +72,8 @@ def test_of_a_field_that_is_read(tmp_path, ranks):
 
 def test_under_mpirun_the_estimate_is_of_these_ranks(tmp_path):
     path = write_case(tmp_path, CASES["dense"])
-    several = subprocess.run([*launcher(2), BERGTOW, "check", path],
-                             env=environment(OMP_NUM_THREADS=1),
-                             capture_output=True,
-                             text=True,
-                             timeout=60)
+    several = subprocess.run([*launcher(2), BERGTOW, "check", path], env=environment(OMP_NUM_THREADS=1),
+                             capture_output=True, text=True, timeout=60)
     alone = call("check", path).stdout
     assert several.returncode == DONE and said(several.stdout, "disk +about") == said(alone, "while it runs;") > said(
         alone, "disk +about")

@@ -216,10 +216,8 @@ WINDY = changed(FIELD, water={"latitude": 75, "current_x": 0.1}, air={"wind_x": 
 
 
 def test_rest_is_rest_and_without_water_or_wind_nothing_changes(tmp_path):
-    still = {
-        start: run(tmp_path, changed(FIELD, ice__start=start, water={"latitude": 75}), name=start)
-        for start in ("drift", "rest")
-    }
+    still = {start: run(tmp_path, changed(FIELD, ice__start=start, water={"latitude": 75}),
+                        name=start) for start in ("drift", "rest")}
     assert still["drift"].hash == still["rest"].hash
     ways = []
     for start in ("rest", "drift"):
@@ -227,10 +225,8 @@ def test_rest_is_rest_and_without_water_or_wind_nothing_changes(tmp_path):
                 changed(WINDY, ice__start=start, run={"dt": 0.1, "duration": 1}, output={"frame_interval": 0.1}),
                 name=f"windy {start}")
         pose = r.dataset("/frames/pose")
-        ways.append([
-            np.hypot(*[v[0] for v in r.series("body_vx", "body_vy")]),
-            np.median(np.hypot(*(pose[1] - pose[0])[:, :2].T)) / 0.1
-        ])
+        ways.append([np.hypot(*[v[0] for v in r.series("body_vx", "body_vy")]),
+                     np.median(np.hypot(*(pose[1] - pose[0])[:, :2].T)) / 0.1])
     assert max(ways[0]) < 0.02 < 0.1 < min(ways[1]), ways
 
 
@@ -268,12 +264,8 @@ def test_a_body_on_a_line_or_led_does_not_begin_adrift(tmp_path, mode, drifts):
 
 
 def test_a_given_velocity_prevails(tmp_path):
-    case = changed(WINDY,
-                   body__vy=-0.5,
-                   floes=[{"shape": "disc", "length": 10, "x": 150, "y": 100, "vx": 0.7}],
-                   ice__concentration=0,
-                   run__dt=0.01,
-                   run__duration=0.02)
+    case = changed(WINDY, body__vy=-0.5, floes=[{"shape": "disc", "length": 10, "x": 150, "y": 100, "vx": 0.7}],
+                   ice__concentration=0, run__dt=0.01, run__duration=0.02)
     r = run(tmp_path, case)
     assert r.series("body_vx")[0] == pytest.approx(0, abs=1e-3) and r.series("body_vy")[0] == pytest.approx(-0.5,
                                                                                                             abs=1e-3)
@@ -286,15 +278,7 @@ def test_the_resolved_file_and_resume_begin_alike(tmp_path):
     assert run(tmp_path, whole.dir / "case.resolved.yml", name="again").hash == whole.hash
     for threads in (1, 2):
         part = tmp_path / f"part{threads}"
-        assert call("run",
-                    write_case(tmp_path, WINDY),
-                    "-o",
-                    part,
-                    "--quiet",
-                    "--steps",
-                    7,
-                    "--threads",
-                    threads,
+        assert call("run", write_case(tmp_path, WINDY), "-o", part, "--quiet", "--steps", 7, "--threads", threads,
                     env=environment()).returncode == DONE
         assert call("resume", part, "--quiet").returncode == DONE
         assert f'"state_hash": "{whole.hash}"' in (part / "summary.json").read_text()

@@ -308,8 +308,7 @@ def test_what_a_seed_or_a_frame_decided(tmp_path):
 def test_a_window_of_the_basin_faces_its_way_points(tmp_path):
     """Red with 20 m ahead of the body, and 30 behind, as if it were towed towards x."""
     case = {"run": {"dt": 0.1, "duration": 20}, "domain": {"length": 50, "ends": "moving"},
-            "ice": {"concentration": 0.5},
-            "tow": {"mode": "line", "speed": 0.1, "waypoints": [[-60, 0]]}}
+            "ice": {"concentration": 0.5}, "tow": {"mode": "line", "speed": 0.1, "waypoints": [[-60, 0]]}}
     for at, x in ((-60, 30), (60, 20)):
         r = run(tmp_path, changed(case, tow__waypoints=[[at, 0]]), "--steps", 1, name=str(x))
         text = (r.dir / "case.resolved.yml").read_text()

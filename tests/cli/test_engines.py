@@ -100,8 +100,7 @@ if __name__ == "__main__":
             bergtow.Ensemble.run({str(path)!r}, {str(out)!r}, client=client, progress=False)
 """
     p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                         env=environment(BERGTOW=str(BERGTOW)),
-                         preexec_fn=heard)
+                         env=environment(BERGTOW=str(BERGTOW)), preexec_fn=heard)
     until(lambda: len(list(out.glob("members/*/result.part.h5"))) == 2)
     p.send_signal(signal.SIGINT)
     _, err = p.communicate(timeout=60)

@@ -134,10 +134,8 @@ def test_killed_and_called_again(quiet, tmp_path):
     prepare(tmp_path)
     rng = random.Random(3)
     for _ in range(4):
-        child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                                 cwd=tmp_path,
-                                 env=environment(OMP_NUM_THREADS=1),
-                                 stdout=subprocess.DEVNULL)
+        child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                                 env=environment(OMP_NUM_THREADS=1), stdout=subprocess.DEVNULL)
         time.sleep(0.15 + 0.4 * rng.random())
         child.kill()
         child.wait()
@@ -185,13 +183,9 @@ def test_a_reader_that_has_gone(quiet, tmp_path):
 def test_interrupted(quiet, tmp_path, number):
     folder, _ = quiet
     prepare(tmp_path)
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                             cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1),
-                             stdout=subprocess.PIPE,
-                             stderr=subprocess.PIPE,
-                             text=True,
-                             preexec_fn=heard)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                             text=True, preexec_fn=heard)
     while not list(tmp_path.glob("all/members/*/result*.h5")):
         time.sleep(0.01)
     child.send_signal(number)
@@ -214,11 +208,8 @@ def test_interrupted(quiet, tmp_path, number):
 def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
     folder, _ = quiet
     prepare(tmp_path)
-    jobs = [
-        subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--quiet"],
-                         cwd=tmp_path,
-                         env=environment(OMP_NUM_THREADS=1)) for _ in range(3)
-    ]
+    jobs = [subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--quiet"], cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1)) for _ in range(3)]
     assert [j.wait(timeout=120) for j in jobs] == [DONE] * 3
     starts = [j["member"] for j in journal(tmp_path) if j["event"] == "start"]
     assert len(starts) == len(set(starts)) == 12 and len({j["pid"] for j in journal(tmp_path)}) > 1
@@ -228,13 +219,9 @@ def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
 
     groups = changed(STUDY, ranks=2, repeats=2)
     prepare(tmp_path / "mpi", groups)
-    result = subprocess.run(
-        [*launcher(3), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-        cwd=tmp_path / "mpi",
-        env=environment(OMP_NUM_THREADS=1),
-        capture_output=True,
-        text=True,
-        timeout=180)
+    result = subprocess.run([*launcher(3), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                            cwd=tmp_path / "mpi", env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
+                            timeout=180)
     assert result.returncode == DONE, result.stderr
     with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "mpi/all/ensemble.h5") as b:
         kept = a["members/repeat"][()] < 2
@@ -266,10 +253,7 @@ def test_a_full_disk_is_named_and_made_good(quiet, tmp_path):
     prepare(tmp_path, changed(STUDY, repeats=1))
     # The members' files hit the limit on file sizes; the small texts do not.
     limited = subprocess.run(["bash", "-c", f"ulimit -f 40; exec {BERGTOW} ensemble study.yml -o all --threads 1"],
-                             cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1),
-                             capture_output=True,
-                             text=True,
+                             cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                              timeout=120)
     assert limited.returncode == IO and "failed (4)" in limited.stderr and "ulimit -f" in limited.stderr
     assert ensemble(tmp_path, "all", "--retry-failed").returncode == DONE

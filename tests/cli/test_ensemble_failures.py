@@ -51,11 +51,8 @@ def page(monkeypatch):
     def made(folder):
         cli.perform("report", folder / "all")
         text = unescape((folder / "all/report.html").read_text())
-        rows = {
-            name: re.sub(r"<[^>]*>", " ", rest)
-            for name, rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text,
-                                         re.S)
-        }
+        rows = {name: re.sub(r"<[^>]*>", " ", rest) for name,
+                rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text, re.S)}
         reported = {
             name: re.sub(r"<[^>]*>", "", rest).strip()
             for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)
@@ -71,12 +68,8 @@ def statuses(folder):
 
 def test_a_bad_value(tmp_path, page):
     """What only the whole case shows, and what only the setting up does."""
-    prepare(
-        tmp_path, {
-            "base": "base.yml", "variants": {
-                "good": {}, "short": {"run.duration": 3}, "lost": {"ice.field": "none.h5"}, "slow": {"tow.speed": 0.05}
-            }
-        })
+    prepare(tmp_path, {"base": "base.yml", "variants": {"good": {}, "short": {"run.duration": 3},
+                                                        "lost": {"ice.field": "none.h5"}, "slow": {"tow.speed": 0.05}}})
     result = ensemble(tmp_path)
     assert result.returncode in (CASE, IO) and "2 members finished, 2 failed, 0 left" in result.stdout
     warnings, rows, reported = page(tmp_path)
@@ -94,8 +87,7 @@ def tmpfs():
 
     def mount(place, size):
         place.mkdir(parents=True, exist_ok=True)
-        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place],
-                              capture_output=True,
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place], capture_output=True,
                               text=True)
         if done.returncode != 0:
             pytest.skip(f"no small file system can be mounted here: {done.stderr.strip() or 'not root'}")
@@ -248,8 +240,7 @@ def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_p
     assert with_a_dead_rank(tmp_path, "none") == NUMERIC
     assert statuses(tmp_path) == {f"c00{c}-r00{r}": 2 if (c, r) == (2, 1) else 1 for c in (1, 2, 3) for r in (1, 2)}
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
-        assert np.array_equal(f["summary/mean_ice_resistance_n"][()],
-                              np.where(np.arange(6) == 2, np.nan, whole),
+        assert np.array_equal(f["summary/mean_ice_resistance_n"][()], np.where(np.arange(6) == 2, np.nan, whole),
                               equal_nan=True)
 
 

@@ -119,10 +119,8 @@ def test_a_limit_of_wall_time_leaves_whole_fields(quiet, tmp_path):
 def test_a_limit_of_wall_time_leaves_a_fair_sample_of_a_hypercube(tmp_path):
     """Whatever its conditions cost: where the time ends, the costly ones alone would have another mean. Without a limit
     nothing is left out, and the costly ones come first."""
-    hypercube = {
-        "base": "base.yml", "sampling": "latin-hypercube", "samples": 12, "repeats": 2,
-        "parameters": {"ice.concentration": {"from": 0.1, "to": 0.7}}
-    }
+    hypercube = {"base": "base.yml", "sampling": "latin-hypercube", "samples": 12, "repeats": 2,
+                 "parameters": {"ice.concentration": {"from": 0.1, "to": 0.7}}}
     started = []
     for folder, limit in (("free", []), ("limited", ["--max-wall", 1000])):
         (tmp_path / folder).mkdir()

@@ -23,21 +23,13 @@ def ensemble(folder, *more, **how):
 
 
 def on_two_ranks(folder):
-    return subprocess.run(
-        [*launcher(2), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-        cwd=folder,
-        env=environment(OMP_NUM_THREADS=1),
-        capture_output=True,
-        text=True,
-        timeout=180)
+    return subprocess.run([*launcher(2), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=folder,
+                          env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=180)
 
 
 def started(folder):
-    return [
-        j["member"]
-        for j in map(json.loads, (folder / "all/journal.jsonl").read_text().splitlines())
-        if j["event"] == "start"
-    ]
+    return [j["member"] for j in map(json.loads,
+                                     (folder / "all/journal.jsonl").read_text().splitlines()) if j["event"] == "start"]
 
 
 @pytest.fixture(scope="module")
@@ -175,25 +167,15 @@ def test_without_permission(quiet, copy):
         if os.stat(folder).st_uid == 0 and folder != folder.parent and "pytest" in str(folder):
             folder.chmod(0o755)
     (member / "result.h5").chmod(0)
-    command = [
-        "setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", BERGTOW, "ensemble", "study.yml", "-o", "all",
-        "--threads", "1"
-    ]
-    result = subprocess.run(command,
-                            cwd=copy,
-                            env=environment(OMP_NUM_THREADS=1),
-                            capture_output=True,
-                            text=True,
+    command = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", BERGTOW, "ensemble", "study.yml", "-o",
+               "all", "--threads", "1"]
+    result = subprocess.run(command, cwd=copy, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                             timeout=60)
     if "command not found" in result.stderr or "Permission denied" in result.stderr and BERGTOW in result.stderr:
         pytest.skip("another user cannot reach the program here")
     assert result.returncode == IO and "c002-r001/result.h5: cannot read the file: Permission denied" in result.stderr
     (member / "result.h5").chmod(0o644)
-    result = subprocess.run(command,
-                            cwd=copy,
-                            env=environment(OMP_NUM_THREADS=1),
-                            capture_output=True,
-                            text=True,
+    result = subprocess.run(command, cwd=copy, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                             timeout=60)
     assert result.returncode == DONE and differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == []
 
@@ -212,18 +194,12 @@ def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
         result = ensemble(copy, "--no-wait")
         assert (result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr
                 and "3 members finished, 0 failed, 1 left" in result.stdout)
-        waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                                   cwd=copy,
-                                   env=environment(OMP_NUM_THREADS=1),
-                                   stdout=subprocess.PIPE,
-                                   text=True)
+        waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=copy,
+                                   env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
         time.sleep(1)
         assert waiting.poll() is None
-        interrupted = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                                       cwd=copy,
-                                       env=environment(OMP_NUM_THREADS=1),
-                                       stderr=subprocess.PIPE,
-                                       text=True)
+        interrupted = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=copy,
+                                       env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
         time.sleep(0.5)
         interrupted.send_signal(signal.SIGINT)
         assert "stopped by a signal" in interrupted.communicate(timeout=30)[1] and interrupted.returncode == SIGNAL
@@ -265,18 +241,12 @@ def test_damage_while_a_call_is_at_work(tmp_path):
             "variants": {"long": {"run.duration": "150 s", "tow.speed": 0.04}, "short": {"run.duration": 6}}
         }))
     short, long_one = (tmp_path / "all/members" / name for name in ("c002-r001", "c001-r001"))
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                             cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1),
-                             stderr=subprocess.PIPE,
-                             text=True)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
     assert child.wait(timeout=60) == DONE
     (long_one / "finished").unlink()
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
-                             cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1),
-                             stderr=subprocess.PIPE,
-                             text=True)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
     while started(tmp_path).count(long_one.name) < 2:
         time.sleep(0.01)
     flip(short / "result.h5", -1)

@@ -26,10 +26,8 @@ DRIFT = {
     "floes": [{"shape": "rectangle", "length": 50, "width": 20, "yaw": -40, "x": 3000, "y": 3000}],
 }
 WIND, CURRENT = np.array([9.0, -4.0]), np.array([0.15, 0.25])
-WEATHER = {
-    "water__current_x": CURRENT[0], "water__current_y": CURRENT[1], "water__latitude": 75, "air__wind_x": WIND[0],
-    "air__wind_y": WIND[1]
-}
+WEATHER = {"water__current_x": CURRENT[0], "water__current_y": CURRENT[1], "water__latitude": 75,
+           "air__wind_x": WIND[0], "air__wind_y": WIND[1]}
 
 
 def steady_drift(outline, mass, draft, sail, c, f, balance=(0, 0), wind=WIND, current=CURRENT):
@@ -95,16 +93,10 @@ def test_a_pack_drifts_as_its_floes_do(tmp_path):
     """Without form drag every floe of one thickness has the same free drift, whatever its size and place: a dense pack
     moves as one and its floes do not press on each other."""
     bare = FLOE | {"water_form": 0, "air_form": 0}
-    case = changed(DRIFT,
-                   domain={"frame": "geographic", "length": 600, "width": 400, "ends": "periodic", "sides": "periodic"},
-                   ice={
-                       "concentration": 0.85, "size": 30, "size_law": "lognormal", "size_spread": 0.4, "thickness": 0.5,
-                       "drag": bare
-                   },
-                   body={"shape": "none"},
-                   floes=None,
-                   run={"dt": 5, "duration": 20000},
-                   **WEATHER)
+    case = changed(DRIFT, domain={"frame": "geographic", "length": 600, "width": 400, "ends": "periodic",
+                                  "sides": "periodic"}, ice={"concentration": 0.85, "size": 30, "size_law": "lognormal",
+                                                             "size_spread": 0.4, "thickness": 0.5, "drag": bare},
+                   body={"shape": "none"}, floes=None, run={"dt": 5, "duration": 20000}, **WEATHER)
     r = run(tmp_path, case)
     f = 2 * OMEGA * np.sin(np.radians(75))
     draft = 0.5 * 910 / RHO_W
@@ -126,15 +118,8 @@ def test_inertial_circle(tmp_path, frame, latitude):
     none = dict.fromkeys(BERG, 0)
     f, speed = 2 * OMEGA * np.sin(np.radians(latitude)) / 1.5, 0.3
     period = 2 * np.pi / abs(f)
-    case = changed(DRIFT,
-                   domain__frame=frame,
-                   domain__x0=-1e5,
-                   body__x=0,
-                   body__vx=speed,
-                   body__drag=none,
-                   ice__drag=none,
-                   water={"latitude": latitude},
-                   run={"dt": period / 9000, "duration": period})
+    case = changed(DRIFT, domain__frame=frame, domain__x0=-1e5, body__x=0, body__vx=speed, body__drag=none,
+                   ice__drag=none, water={"latitude": latitude}, run={"dt": period / 9000, "duration": period})
     r = run(tmp_path, case)
     t, x, y = r.series("time", "body_x", "body_y")
     right = (1 if frame == "geographic" else -1) * np.sign(latitude)
@@ -237,11 +222,8 @@ def test_tables_that_are_refused(tmp_path, kind):
 def test_keys_beside_a_table_and_a_table_that_is_missing(tmp_path):
     (tmp_path / "t.csv").write_text("t,u,v\n0,1,1\n50,1,1\n")
     base = changed(DRIFT, run__duration=50)
-    path = write_case(
-        tmp_path,
-        changed(base,
-                water={"current_table": "t.csv", "current_x": 0.1, "tide": {"major": 0.2}},
-                air={"wind_table": "t.csv", "wind_y": 3}))
+    path = write_case(tmp_path, changed(base, water={"current_table": "t.csv", "current_x": 0.1,
+                                                     "tide": {"major": 0.2}}, air={"wind_table": "t.csv", "wind_y": 3}))
     result = call("check", path)
     assert result.returncode == CASE
     for key, table in (("water.current_x", "water.current_table"), ("water.tide.major", "water.current_table"),

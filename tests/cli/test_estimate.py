@@ -143,12 +143,8 @@ def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
 def test_open_water_drag_is_what_a_tow_in_open_water_meets(tmp_path):
     """The same law in src/force/forces.c and in the estimate, with a current at an angle, a body that is no disc, and
     the air taken away."""
-    case = changed(TOW,
-                   ice__concentration=0,
-                   body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20},
-                   air__density=0,
-                   water={"current_x": -0.05, "current_y": 0.04},
-                   output__window_start=10)
+    case = changed(TOW, ice__concentration=0, body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20},
+                   air__density=0, water={"current_x": -0.05, "current_y": 0.04}, output__window_start=10)
     r = run(tmp_path, case)
     assert r.summary["estimates"]["open_water_drag"]["force_n"] == pytest.approx(r.summary["mean_drag_force_n"],
                                                                                  rel=1e-12)
@@ -163,12 +159,8 @@ def twin(folder, path, scale, name):
     return folder / name
 
 
-LOOSE = changed(TOW,
-                run__duration=60,
-                tow={"mode": "line", "speed": 0.13, "line_stiffness": 2e4},
-                water__current_y=0.01,
-                air__wind_x=1.0,
-                output__window_start=10)
+LOOSE = changed(TOW, run__duration=60, tow={"mode": "line", "speed": 0.13, "line_stiffness": 2e4},
+                water__current_y=0.01, air__wind_x=1.0, output__window_start=10)
 
 
 def dimensionless(a, b, L, tolerance):
@@ -247,8 +239,7 @@ def test_a_twin_out_of_range_is_refused(tmp_path):
 
 
 WEAK = changed(TOW, tow={"mode": "thrust", "speed": 0.13, "ramp": 2, "line_length": 3, "line_stiffness": "1 kN",
-                         "vessel": {"mass": 100, "bollard_pull": 2, "free_speed": 1}},
-               output__window_start=10)
+                         "vessel": {"mass": 100, "bollard_pull": 2, "free_speed": 1}}, output__window_start=10)
 DRIVEN = {
     "run": {"dt": 1, "duration": 400},
     "domain": {"frame": "geographic", "length": 600, "width": 200, "ends": "moving", "sides": "periodic"},

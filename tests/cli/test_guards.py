@@ -70,13 +70,8 @@ def test_what_drives_the_ice_is_no_failure_on_a_slow_tow(tmp_path, more):
 
 def test_a_table_of_wind_drives_the_ice(tmp_path):
     (tmp_path / "wind.csv").write_text("t,u,v\n0,0,0\n10,15,0\n40,15,0\n")
-    run(
-        tmp_path,
-        changed(TOW,
-                tow__speed=0.0005,
-                solver__reference_speed=0.0005,
-                solver__max_sweeps=40,
-                air={"wind_table": "wind.csv"}), "--quiet")
+    run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40,
+                          air={"wind_table": "wind.csv"}), "--quiet")
 
 
 def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
@@ -113,13 +108,8 @@ def test_walls_that_leave_the_body_no_room_are_refused_whatever_the_ice(tmp_path
 
 # ---- the last state ----
 
-LAST = changed(CLOSING,
-               domain__ends_closing=0.3,
-               domain__sides_closing=0.2,
-               ice__concentration=0.6,
-               guard={"overlap": 0, "escape": False},
-               run__duration=3,
-               output__frame_interval=1,
+LAST = changed(CLOSING, domain__ends_closing=0.3, domain__sides_closing=0.2, ice__concentration=0.6,
+               guard={"overlap": 0, "escape": False}, run__duration=3, output__frame_interval=1,
                output__checkpoint_steps=7)
 
 

@@ -127,10 +127,8 @@ def test_everything_is_counted_over_the_window_that_is_found(found):
 @pytest.mark.slow
 def test_a_long_run_that_was_killed_counts_the_same(tmp_path):
     """More steps than blocks of five hold: killed before the window, and within it."""
-    case = changed(FOUND,
-                   run__dt=0.0025,
-                   ice__concentration=0.2,
-                   output={"panels": True, "checkpoint_steps": 1500, "frame_interval": 60})
+    case = changed(FOUND, run__dt=0.0025, ice__concentration=0.2, output={"panels": True, "checkpoint_steps": 1500,
+                                                                          "frame_interval": 60})
     r = run(tmp_path, case, "--quiet", "--threads", 1)
     start = assert_counted_over_the_window(r)
     assert r.summary["n_steps"] == 24000 and 2 < start < 30
@@ -159,8 +157,7 @@ def test_without_a_window_all_is_the_starts(tmp_path):
     s = r.summary["impacts"]
     assert r.summary["window"]["verdict"] == "too short" and s["collisions"] == 0 < s["collisions_whole_run"]
     assert [s[k] for k in ("from_s", "largest", "largest_quasi_static_load_n", "mean_quasi_static_resistance_n",
-                              "collisions_per_hour")
-            ] == [None] * 5
+                           "collisions_per_hour")] == [None] * 5
     with h5py.File(r.dir / "result.h5") as f:
         p = f["panels"]
         assert np.isnan(p.attrs["from"]) and p.attrs["steps"] == 0 and np.isnan(

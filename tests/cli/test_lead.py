@@ -108,12 +108,8 @@ def test_a_field_says_that_its_lead_is_not_in_it(tmp_path):
 
 def test_a_lead_beyond_the_front_of_a_moving_window_goes_round_it(tmp_path):
     """Ice that enters is as it was made: two laps in a channel, where the mother field behind the body had none."""
-    case = changed(BASE,
-                   run__duration=150,
-                   domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"},
-                   body__x=None,
-                   ice={"concentration": 0.5, "size": 0.7},
-                   lead={"mode": "channel", "width": 2.6})
+    case = changed(BASE, run__duration=150, domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"},
+                   body__x=None, ice={"concentration": 0.5, "size": 0.7}, lead={"mode": "channel", "width": 2.6})
     r = run(tmp_path, case, "--quiet")
     assert r.summary["moving_window"]["laps"] > 1.5 and r.summary["lead"]["length_m"] > 25
     assert r.series("ice_resistance").max() == 0

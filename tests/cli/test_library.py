@@ -15,22 +15,8 @@ import h5py
 import numpy as np
 import pytest
 from bergtow import cli
-from harness import (
-    BERGTOW,
-    DONE,
-    ROOT,
-    TOW,
-    Run,
-    call,
-    changed,
-    differing,
-    environment,
-    make,
-    quick,
-    run,
-    without_make,
-    write_case,
-)
+from harness import (BERGTOW, DONE, ROOT, TOW, Run, call, changed, differing, environment, make, quick, run,
+                     without_make, write_case)
 
 EXAMPLES = ROOT / "tests/examples"
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")

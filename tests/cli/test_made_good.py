@@ -84,8 +84,7 @@ def test_a_body_on_a_line_follows_for_some_lengths_of_it(tmp_path):
     tow = LINE | {"waypoints": [[300, 0], [300, 4000]], "speed": 1}
     for start, turns in ((400, True), (600, True), (1300, False)):
         case = changed(BERG, domain__width=9000, domain__y0=-500, run={"dt": 2, "duration": 2000}, tow=tow,
-                       body__drag__tangential=1,
-                       output__window_start=start)
+                       body__drag__tangential=1, output__window_start=start)
         r = run(tmp_path, case, name=f"from-{start}")
         k = int(start / 2)
         course = np.degrees(np.arctan2(r.series("body_vy"), r.series("body_vx")))[k:k + 100].mean()

@@ -193,8 +193,7 @@ DEGREES = ["urn:ogc:def:crs:OGC:1.3:CRS84", "urn:ogc:def:crs:OGC::CRS84", "OGC:C
            "urn:ogc:def:crs:EPSG:6.9:4326", "epsg:4258", "EPSG:4269"]
 METRES = ["EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "urn:ogc:def:crs:EPSG:8.5:32733",
           "http://www.opengis.net/def/crs/EPSG/0/25833", "EPSG:3413", "EPSG:3976", "EPSG:3995", "EPSG:5041",
-          "EPSG:6931",
-          "EPSG:26910", "EPSG:5938"]
+          "EPSG:6931", "EPSG:26910", "EPSG:5938"]
 
 
 @pytest.mark.parametrize("crs", DEGREES)

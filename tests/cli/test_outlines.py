@@ -143,8 +143,7 @@ def test_overlap_of_shores_not_of_hulls(tmp_path):
     rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="split"))
     assert same_ring(rings[0], at(C_SHAPE, 5, 0), 1e-12)
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 5.3, 0.5)))
-    assert "feature 0 and feature 1 overlap by 0.2 m" in field(tmp_path,
-                                                               changed(BASE, ice__nonconvex="split"),
+    assert "feature 0 and feature 1 overlap by 0.2 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"),
                                                                code=CASE)
     write(tmp_path, feature(at(SQUARE, 5, 0)), feature([[5.4, 0.4], [5.6, 0.4], [5.6, 0.6], [5.4, 0.6]]))
     assert "feature 0 and feature 1 overlap" in field(tmp_path, BASE, code=CASE), "one inside the other"
@@ -157,8 +156,7 @@ def test_overlap_with_every_part(tmp_path, x, y, last):
     small = feature([[x, y], [x + 0.4, y], [x + 0.4, y + 0.4], [x, y + 0.4]])
     c = feature(at(C_SHAPE, 5, 0))
     write(tmp_path, *([c, small] if last else [small, c]))
-    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path,
-                                                                changed(BASE, ice__nonconvex="split"),
+    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"),
                                                                 code=CASE)
 
 
@@ -188,10 +186,8 @@ def test_hull_and_split_are_counted(tmp_path):
 
 def test_many_vertices_become_a_hull(tmp_path):
     """A finely traced shore: too long for a floe as it is, but not for its hull."""
-    circle = [[
-        9 + (1 - 0.1 * (k % 4 > 0)) * math.cos(2 * math.pi * k / 400),
-        math.sin(2 * math.pi * k / 400) * (1 - 0.1 * (k % 4 > 0))
-    ] for k in range(400)]
+    circle = [[9 + (1 - 0.1 * (k % 4 > 0)) * math.cos(2 * math.pi * k / 400),
+               math.sin(2 * math.pi * k / 400) * (1 - 0.1 * (k % 4 > 0))] for k in range(400)]
     write(tmp_path, feature(circle))
     assert "128" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
     rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="hull"))
@@ -320,12 +316,8 @@ def vincenty(lon1, lat1, lon2, lat2):
 
 
 LON, LAT = 19.3, 75.0
-LONLAT = changed(BASE,
-                 domain={"frame": "geographic", "length": 210e3, "width": 210e3, "ends": "open", "sides": "open"},
-                 body={"shape": "none"},
-                 ice__outlines_crs="lonlat",
-                 ice__origin_lon=LON,
-                 ice__origin_lat=LAT)
+LONLAT = changed(BASE, domain={"frame": "geographic", "length": 210e3, "width": 210e3, "ends": "open", "sides": "open"},
+                 body={"shape": "none"}, ice__outlines_crs="lonlat", ice__origin_lon=LON, ice__origin_lat=LAT)
 
 
 def triangle(lon, lat, metres):

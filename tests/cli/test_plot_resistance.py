@@ -157,10 +157,8 @@ def test_the_default_place_is_beside_the_first_run(runs, tmp_path):
 
 
 def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
-    points = [
-        plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)),
-        plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))
-    ]
+    points = [plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)),
+              plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))]
     figure = plot_resistance.draw(points)
     assert any("1 run(s) without resistance" in text.get_text() for text in figure.texts)
     assert "–" in plot_resistance.table(points).splitlines()[2]

@@ -533,13 +533,9 @@ def test_film_as_gif_follows_the_body(tmp_path):
 def test_film_as_mp4_has_every_frame(tmp_path):
     run = make_run(tmp_path / "run", path=[(float(i), 0.0) for i in range(7)])
     done(script("film", run, "--width", 501), run / "film.mp4")
-    probe = subprocess.run([
-        "ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width,height", "-of", "json",
-        run / "film.mp4"
-    ],
-                           capture_output=True,
-                           text=True,
-                           check=True)
+    probe = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_entries",
+                            "stream=nb_read_frames,width,height", "-of", "json", run / "film.mp4"], capture_output=True,
+                           text=True, check=True)
     stream = json.loads(probe.stdout)["streams"][0]
     assert stream["nb_read_frames"] == "7" and stream["width"] == 500 and stream["height"] % 2 == 0
 

@@ -36,16 +36,12 @@ def test_a_form_is_found_over_the_end_of_a_line_and_not_of_a_paragraph(tmp_path,
     assert found(tmp_path, capsys, "The run goes\non.\n\nIt goes\n\non a line") == [(1, "goes on")]
 
 
-@pytest.mark.parametrize("text", [
-    "# What is needed",
-    "What is a floe?",
-    "| Which document is this, of which revision? | title block |",
-    "`check` says what is wrong; it shows exactly what the case needs.",
-    "a run, which stops",
-    "There is no floe that moves.",
-    "`goes on`, and \"it is said that it\ngoes on\"",
-    "```\ngoes on\n```\n\n    goes on\n",
-])
+@pytest.mark.parametrize("text", ["# What is needed", "What is a floe?",
+                                  "| Which document is this, of which revision? | title block |",
+                                  "`check` says what is wrong; it shows exactly what the case needs.",
+                                  "a run, which stops", "There is no floe that moves.",
+                                  "`goes on`, and \"it is said that it\ngoes on\"",
+                                  "```\ngoes on\n```\n\n    goes on\n", ])
 def test_what_is_right_is_left_alone(tmp_path, capsys, text):
     assert found(tmp_path, capsys, text) == []
 

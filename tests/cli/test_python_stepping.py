@@ -254,8 +254,7 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
     rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK"))
     (pathlib.Path(__file__).parent / ("rank" + rank)).write_text("%d %d %s" % said)
 """)
-    result = subprocess.run([*launcher(2), sys.executable, script], capture_output=True,
-                            text=True, timeout=120,
+    result = subprocess.run([*launcher(2), sys.executable, script], capture_output=True, text=True, timeout=120,
                             env=environment())
     assert result.returncode == 0, result.stdout + result.stderr
     said = [(tmp_path / f"rank{k}").read_text().split() for k in range(2)]

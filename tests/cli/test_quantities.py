@@ -40,10 +40,8 @@ pytestmark = pytest.mark.usefixtures("look")
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
 SPEED = changed(TOW, run__duration=12, output__window_start=4, tow__ramp=8)
 #: cases, and what each has of "with a ..." and "where ..."
-LINE = {
-    "with a towed body", "with a tow line", "with a tow line of two branches", "with a vessel",
-    "where collisions are told apart"
-}
+LINE = {"with a towed body", "with a tow line", "with a tow line of two branches", "with a vessel",
+        "where collisions are told apart"}
 WINDOW = {
     "run": {"dt": 0.1, "duration": 8},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic",
@@ -64,11 +62,7 @@ CASES = {
 
 def started(program, *arguments, ranks=1, cwd=None, timeout=200):
     line = [*(launcher(ranks) if ranks > 1 else []), program, *map(str, arguments)]
-    done = subprocess.run(line,
-                          cwd=cwd,
-                          env=environment(OMP_NUM_THREADS=1),
-                          capture_output=True,
-                          text=True,
+    done = subprocess.run(line, cwd=cwd, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                           timeout=timeout)
     assert done.returncode == DONE, done.stderr
     return done.stdout
@@ -92,8 +86,7 @@ def of_run(folder, program, case):
     return folder / "out", said
 
 
-@pytest.fixture(scope="module",
-                params=[(name, program) for name in CASES for program in ("own", "extended")],
+@pytest.fixture(scope="module", params=[(name, program) for name in CASES for program in ("own", "extended")],
                 ids="-".join)
 def left(request, tmp_path_factory):
     """(list of the program, folder that a run of it left, what it said, what the case has)."""

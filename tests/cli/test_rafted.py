@@ -15,11 +15,8 @@ from bergtow.result.run import Run as Reader  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("look")
 SQUARE = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
-PRESSED = changed(TOW,
-                  domain={"length": 15, "width": 8, "ends_closing": 0.15},
-                  ice__concentration=0.75,
-                  ice__rafting={"kappa": 5},
-                  run__duration=15)
+PRESSED = changed(TOW, domain={"length": 15, "width": 8, "ends_closing": 0.15}, ice__concentration=0.75,
+                  ice__rafting={"kappa": 5}, run__duration=15)
 
 
 @pytest.mark.parametrize("shift, area", [((1, 0.5), 1.5), ((3, 0), 0), ((0, 0), 4), ((-1.5, -1.5), 0.25)])

@@ -218,11 +218,8 @@ def thrown(seed):
         x, y = np.cos(way), np.sin(way)
         shape = {"shape": "rectangle", "length": 0.7 + 0.2 * rng.random(), "width": 0.7 +
                  0.2 * rng.random()} if k % 2 else {"shape": "disc", "length": 0.8 + 0.2 * rng.random()}
-        floes.append(
-            shape | {
-                "x": 5 + x, "y": y, "yaw": float(90 * rng.random()), "vx": -0.8 * x, "vy": -0.8 *
-                y, "yaw_rate": float(20 * rng.random() - 10), "thickness": 0.03 + 0.03 * rng.random()
-            })
+        floes.append(shape | {"x": 5 + x, "y": y, "yaw": float(90 * rng.random()), "vx": -0.8 * x, "vy": -0.8 * y,
+                              "yaw_rate": float(20 * rng.random() - 10), "thickness": 0.03 + 0.03 * rng.random()})
     return {
         "run": {"dt": 0.05, "duration": 3}, "domain": {"length": 10, "width": 10, "ends": "open", "sides": "open"},
         "ice": {"concentration": 0, "friction": 0.2, "rafting": {"kappa": 6}}, "body": {"shape": "none"},

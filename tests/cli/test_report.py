@@ -33,13 +33,8 @@ from bergtow.stats import design_value as statement
 
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
 OLD = f"an old page, {writing.MARK}"
-CASE = changed(TOW,
-               output=None,
-               run__title=HOSTILE,
-               ice__concentration=0.7,
-               reference__mean_force=3.0,
-               reference__source="<b>nobody</b>",
-               output__window_start=8)
+CASE = changed(TOW, output=None, run__title=HOSTILE, ice__concentration=0.7, reference__mean_force=3.0,
+               reference__source="<b>nobody</b>", output__window_start=8)
 #: in the map's frame, within a window that goes along, on a line that breaks
 MOVING = changed(
     TOW,
@@ -52,11 +47,8 @@ MOVING = changed(
     })
 
 
-RAFTS = changed(TOW,
-                domain={"length": 15, "width": 8, "ends_closing": 0.15},
-                ice__concentration=0.75,
-                ice__rafting={"kappa": 5},
-                run__duration=15)
+RAFTS = changed(TOW, domain={"length": 15, "width": 8, "ends_closing": 0.15}, ice__concentration=0.75,
+                ice__rafting={"kappa": 5}, run__duration=15)
 
 
 def script(*arguments):
@@ -494,13 +486,8 @@ def test_says_when_the_browser_cannot_unpack(chrome, alone):
 @pytest.mark.slow
 def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
     """Every section that a run has nothing for is left out; a picture of a line of which nothing is left is drawn."""
-    adrift = run(
-        tmp_path / "adrift",
-        changed(MOVING,
-                domain={"length": 15, "width": 8},
-                ice__concentration=0.2,
-                run__duration=6,
-                tow__line__breaking_load=10))
+    adrift = run(tmp_path / "adrift", changed(MOVING, domain={"length": 15, "width": 8}, ice__concentration=0.2,
+                                              run__duration=6, tow__line__breaking_load=10))
     assert [e["kind"] for e in adrift.summary["events"]] == ["line_broken", "adrift"]
     assert script(adrift.dir).returncode == 0
     page = (adrift.dir / "report.html").read_text()

@@ -415,10 +415,7 @@ def test_a_disk_that_fills_up(tmp_path, small_disk):
             result = call("resume", "out", "--quiet", cwd=disk)
             ballast.unlink()
         else:
-            result = call("resume",
-                          "out",
-                          "--quiet",
-                          cwd=disk,
+            result = call("resume", "out", "--quiet", cwd=disk,
                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * left, 1024 * left)))
         if result.returncode == DONE:
             break
@@ -459,12 +456,8 @@ def test_a_folder_that_must_not_be_written(stopped, somebody):
     out = folder / "out"
     before = (out / "checkpoint.h5").read_bytes()
     out.chmod(0o555)
-    result = subprocess.run([*somebody, BERGTOW, "resume", "out", "--quiet"],
-                            cwd=folder,
-                            env=environment(OMP_NUM_THREADS=1),
-                            capture_output=True,
-                            text=True,
-                            timeout=60)
+    result = subprocess.run([*somebody, BERGTOW, "resume", "out", "--quiet"], cwd=folder,
+                            env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
     out.chmod(0o755)
     assert result.returncode == IO and re.search(
         r"out/run.lock: cannot make the file: Permission denied; change the permissions", result.stderr), result.stderr
@@ -481,11 +474,8 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     out = tmp_path / "out"
     out.mkdir()
     out.chmod(0o777)
-    p = subprocess.Popen([*somebody, BERGTOW, "run", "case.yml", "-o", "out", "--quiet"],
-                         cwd=tmp_path,
-                         env=environment(OMP_NUM_THREADS=1),
-                         stderr=subprocess.PIPE,
-                         text=True)
+    p = subprocess.Popen([*somebody, BERGTOW, "run", "case.yml", "-o", "out", "--quiet"], cwd=tmp_path,
+                         env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
     end = time.time() + 30
     while not (out / "checkpoint.h5").exists() and time.time() < end:
         time.sleep(0.005)
@@ -505,10 +495,7 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
 
 # ---- guards ----
 
-JAM = changed(TOW,
-              run__duration=25,
-              ice__concentration=0.8,
-              solver={"max_sweeps": 3, "tolerance": 1e-6},
+JAM = changed(TOW, run__duration=25, ice__concentration=0.8, solver={"max_sweeps": 3, "tolerance": 1e-6},
               output__checkpoint_steps=30)
 
 

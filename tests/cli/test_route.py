@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """bergtow route around its planner: positions, members of a map, routes as cases, the towed circle, an honest choice,
 what is kept through a kill, and the receding horizon."""
+import functools
 import json
 import re
 import signal
@@ -14,7 +15,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed, environment, run, script, write_case
+from harness import (BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed, environment, heard, run, script,
+                     write_case)
 
 import bergtow
 from bergtow.errors import RunError
@@ -34,6 +36,9 @@ def routed(tmp_path_factory):
     assert done.returncode == DONE, done.stderr
     return SimpleNamespace(folder=folder, out=folder / "out", said=done.stdout,
                            found=json.loads((folder / "out/route.json").read_text()))
+
+
+called = functools.partial(script, drawn=False)  # pages are those of `routed`
 
 
 def read_situation(folder, case, **more):
@@ -234,7 +239,7 @@ def test_work_in_open_water_is_known(tmp_path):
     """Drag times the way and the kinetic energy. Red: force and way of different directions or times."""
     case = changed(BASIN, ice__concentration=0, domain__length=40, tow__speed=0.4)
     write_case(tmp_path, case)
-    done = script("route", tmp_path / "case.yml", "--to", "22.5,0", "-o", tmp_path / "out", "--members", "1")
+    done = called("route", tmp_path / "case.yml", "--to", "22.5,0", "-o", tmp_path / "out", "--members", "1")
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
     (tow,) = next(r for r in found["routes"] if r["kind"] == "straight")["members"]
@@ -330,7 +335,7 @@ def test_every_route_is_towed_through_the_same_ice(routed):
 
 def test_a_route_is_a_case(routed, tmp_path):
     """The file of a route leads to the very tow, in the ice of the map."""
-    done = script("route", routed.folder / "case.yml", *QUICK[:4], "--members", "1", "-o", tmp_path / "out")
+    done = called("route", routed.folder / "case.yml", *QUICK[:3], "1", "--members", "1", "-o", tmp_path / "out")
     assert done.returncode == DONE, done.stderr
     for r in json.loads((tmp_path / "out/route.json").read_text())["routes"]:
         assert call("run", tmp_path / "out" / r["case"], "-o", tmp_path / r["name"], "--quiet").returncode == DONE
@@ -348,7 +353,8 @@ def test_what_is_killed_goes_on(routed, tmp_path):
     out = tmp_path / "out"
     words = [sys.executable, "-m", "bergtow", "route", str(tmp_path / "case.yml"), *QUICK, "-o", str(out)]
     env = environment(BERGTOW=BERGTOW, PYTHONPATH=ROOT / "postproc")
-    process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                               preexec_fn=heard)
     while process.poll() is None and len(list(out.glob("route/*/f0*/finished"))) < 3:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
@@ -359,7 +365,7 @@ def test_what_is_killed_goes_on(routed, tmp_path):
     kept = {p: p.stat().st_mtime_ns for p in out.glob("route/*/f0*/finished")}
     assert 3 <= len(kept) < 4 * len(routed.found["routes"])
     assert json.loads((out / "route.json").read_text())["verdict"] is None
-    again = script("route", tmp_path / "case.yml", *QUICK, "-o", out)
+    again = called("route", tmp_path / "case.yml", *QUICK, "-o", out)
     assert again.returncode == DONE, again.stderr
     assert all(p.stat().st_mtime_ns == t for p, t in kept.items())
     assert without_clocks(json.loads((out / "route.json").read_text())) == without_clocks(routed.found)
@@ -374,7 +380,7 @@ def test_a_place_gives_degrees_and_a_gpx(tmp_path):
             "tow": {"mode": "line", "speed": 0.5, "line_length": 300, "line_stiffness": "40 MN"}}
     place = situation.Place(True, tuple(np.radians([20, 76.5])))
     (lon, lat), = place.degrees([(500, 100)])
-    done = script("route", write_case(tmp_path, case), "--to", f"{lon:.8f}E,{lat:.8f}N", "--plan-only", "--routes", "1",
+    done = called("route", write_case(tmp_path, case), "--to", f"{lon:.8f}E,{lat:.8f}N", "--plan-only", "--routes", "1",
                   "-o", tmp_path / "out")
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
@@ -392,7 +398,7 @@ def test_a_place_gives_degrees_and_a_gpx(tmp_path):
 def test_a_new_look_leaves_the_way_so_far(tmp_path):
     """The tow up to a look is that of the looks before, to the bit. Red: the way that is decided moves."""
     write_case(tmp_path, BASIN)
-    done = script("route", tmp_path / "case.yml", "--to", "8.5,0.3", "--routes", "1", "--members", "1", "--replan",
+    done = called("route", tmp_path / "case.yml", "--to", "8.5,0.3", "--routes", "1", "--members", "1", "--replan",
                   "12 s", "-o", tmp_path / "out")
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
@@ -429,7 +435,7 @@ def test_looks_from_a_line(tmp_path):
     """Round a shoal, with a map of some age and errors; killed between looks, the same call ends as if it had not been.
     Red: what is decided is the way of the body; looks are drawn anew; the tow through the shoal counts as one."""
     whole, killed = towed_on_a_line(tmp_path / "whole"), towed_on_a_line(tmp_path / "killed")
-    done = script("route", "case.yml", *LOOKS, "-o", "out", cwd=whole)
+    done = called("route", "case.yml", *LOOKS, "-o", "out", cwd=whole)
     assert done.returncode == DONE, done.stderr
     found = json.loads((whole / "out/route.json").read_text())
     towed = found["horizon"]["tows"]
@@ -451,7 +457,7 @@ def test_looks_from_a_line(tmp_path):
     process.kill()
     process.wait()
     assert not (killed / "out/horizon.yml").exists()
-    again = script("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)
+    again = called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)
     assert again.returncode == DONE, again.stderr
     other = json.loads((killed / "out/route.json").read_text())
     assert other["rounds"] == found["rounds"]
@@ -461,7 +467,7 @@ def test_looks_from_a_line(tmp_path):
 def test_a_line_that_parts_ends_the_looks(tmp_path):
     """Red: the rest is planned from where no body is."""
     write_case(tmp_path, changed(LINE, tow=LINE["tow"] | {"line": {"breaking_load": "20 kN"}}))
-    done = script("route", "case.yml", "--to", "400,0", "--routes", "1", "--replan", "150 s", "--members", "1", "-o",
+    done = called("route", "case.yml", "--to", "400,0", "--routes", "1", "--replan", "150 s", "--members", "1", "-o",
                   "out", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
@@ -570,7 +576,7 @@ def test_wrong_use_is_said(tmp_path, changes, words, code, said):
         (tmp_path / f"{name}.geojson").write_text(json.dumps(what))
     (tmp_path / "text.geojson").write_text("x")
     (tmp_path / "map.shp").write_text("x")
-    done = script("route", "case.yml", *words, "--members", "1", "-o", "out", cwd=tmp_path)
+    done = called("route", "case.yml", *words, "--members", "1", "-o", "out", cwd=tmp_path)
     assert done.returncode == code, (done.stdout, done.stderr)
     assert re.search(said, done.stderr), done.stderr
     assert "Traceback" not in done.stderr
@@ -581,7 +587,7 @@ def test_land_beside_the_line_is_passed(tmp_path):
     write_case(tmp_path, changed(BASIN, ice__concentration=0.05))
     shoal = {"type": "Polygon", "coordinates": [[[5, -0.7], [6, -0.7], [6, 0.4], [5, 0.4], [5, -0.7]]]}
     (tmp_path / "shoal.geojson").write_text(json.dumps(local(shoal)))
-    done = script("route", "case.yml", "--to", "9.5,0", "--no-go", "shoal.geojson", "--members", "1", "--routes", "1",
+    done = called("route", "case.yml", "--to", "9.5,0", "--no-go", "shoal.geojson", "--members", "1", "--routes", "1",
                   "--clearance", "0.1", "-o", "out", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
@@ -593,7 +599,7 @@ def test_land_beside_the_line_is_passed(tmp_path):
 
 def test_the_fit_says_how_well_it_ranks(tmp_path):
     write_case(tmp_path, BASIN)
-    done = script("route", "case.yml", "--to", "8.5,0", "--calibrate", "6", "--members", "1", "--routes", "1", "-o",
+    done = called("route", "case.yml", "--to", "8.5,0", "--calibrate", "6", "--members", "1", "--routes", "1", "-o",
                   "out", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
     told = json.loads((tmp_path / "out/route.json").read_text())["calibration"]

@@ -146,13 +146,9 @@ def start(tmp_path):
     started = []
 
     def go(case=ENDLESS, *arguments):
-        started.append(
-            subprocess.Popen(
-                [BERGTOW, "run", write_case(tmp_path, case), "-o", tmp_path / "out", *arguments],
-                env=environment(OMP_NUM_THREADS=1),
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True))
+        started.append(subprocess.Popen([BERGTOW, "run", write_case(tmp_path, case), "-o", tmp_path / "out",
+                                         *arguments], env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True))
         return started[-1]
 
     yield go
@@ -264,14 +260,7 @@ def test_a_full_disk(tmp_path, kilobytes, what):
     case = changed(ENDLESS, run__duration=1e5, output__frame_interval=0.5)
     path = write_case(tmp_path, case)
     began = time.time()
-    result = call("run",
-                  path,
-                  "-o",
-                  tmp_path / "out",
-                  "--steps",
-                  20000,
-                  "--quiet",
-                  preexec_fn=limited(kilobytes),
+    result = call("run", path, "-o", tmp_path / "out", "--steps", 20000, "--quiet", preexec_fn=limited(kilobytes),
                   timeout=60)
     assert result.returncode == IO, (result.returncode, result.stderr)
     lines = result.stderr.strip().splitlines()

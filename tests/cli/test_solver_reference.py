@@ -208,13 +208,8 @@ def test_the_problem_does_not_come_from_the_solution(tmp_path):
     """W, q, μ of the first step are the same whether the solver had one sweep or all it wanted; the solution is not.
     The water moves, so that contacts are looked for everywhere: a solution that reaches floes at rest has the step
     detected once more."""
-    case = changed(BASE,
-                   ice__friction=0.2,
-                   domain__ends_closing=0.5,
-                   domain__sides_closing=0.5,
-                   guard__overlap=0,
-                   ice__concentration=0.93,
-                   water={"current_x": 1.5})
+    case = changed(BASE, ice__friction=0.2, domain__ends_closing=0.5, domain__sides_closing=0.5, guard__overlap=0,
+                   ice__concentration=0.93, water={"current_x": 1.5})
     one, _ = dump(tmp_path, changed(case, solver__max_sweeps=1), 1, "one")
     all_, _ = dump(tmp_path, case, 1, "all")
     assert np.abs(one.r - all_.r).max() > 1e-3 * np.abs(all_.r).max() > 0

@@ -43,11 +43,9 @@ def grid(folder, concentrations=(0.2, 0.5), speeds=(0.1, 0.2, 0.4), change=lambd
                 x = np.abs(made_up.ar1(0.5, LENGTH, rng, mean, 0.1 * mean))
                 x *= mean / x.mean()
                 n = rng.poisson(100)
-                members.append(
-                    made_up.member(x, {"ice.concentration": a, "tow.speed": v},
-                                   i * len(speeds) + j,
-                                   peaks=(np.sort(rng.uniform(0, LENGTH, n)), rng.exponential(50 * v, n)),
-                                   **change(i * len(speeds) + j, r)))
+                members.append(made_up.member(x, {"ice.concentration": a, "tow.speed": v}, i * len(speeds) + j,
+                                              peaks=(np.sort(rng.uniform(0, LENGTH, n)), rng.exponential(50 * v, n)),
+                                              **change(i * len(speeds) + j, r)))
     return made_up.write(folder, members)
 
 
@@ -138,10 +136,8 @@ def test_means_and_intervals_of_known_fields(plain):
         # AR(1) of 0.5: standard deviation 0.1 of a field's mean, tau 1.5 samples
         assert r["se_within"] == pytest.approx(0.1 * mean * np.sqrt(3 / LENGTH), rel=0.3)
         assert FIELDS * LENGTH / 5 < c["samples"]["independent"] < FIELDS * LENGTH / 2  # every third or fourth
-        assert c["estimates"]["lichey_hellmer"] == {
-            "label": "Lichey-Hellmer", "on_top": False, "force": 80, "valid": True, "compares": True,
-            "ratio": pytest.approx(mean / 80)
-        }
+        assert c["estimates"]["lichey_hellmer"] == {"label": "Lichey-Hellmer", "on_top": False, "force": 80,
+                                                    "valid": True, "compares": True, "ratio": pytest.approx(mean / 80)}
         assert np.isnan(c["estimates"]["open_water_drag"]["ratio"]
                         or np.nan) and not c["estimates"]["marchenko_compaction"]["valid"]
         assert c["estimates"]["open_water_drag"]["ratio"] is None
@@ -327,10 +323,8 @@ def test_what_is_refused(tmp_path, plain, capsys):
     for command in ("statistics", "plot-ensemble"):
         with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
             cli.perform(command, waiting)
-    mixed = made_up.write(tmp_path / "m", [
-        made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c)
-        for c in ("half-sine of 0.1 s", "crushing")
-    ])
+    mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]),
+                                                          conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
     cli.perform("statistics", mixed)
     assert "peaks of different conversions" in capsys.readouterr().out
 
@@ -557,11 +551,8 @@ def flat_names(path):
 @pytest.mark.slow
 def test_a_small_ensemble_of_the_program(tmp_path):
     write_case(tmp_path, changed(TOW, run__duration=60, output__window_start=5, domain__length=20), "base.yml")
-    (tmp_path / "study.yml").write_text(
-        json.dumps({
-            "title": "tiny", "base": "base.yml", "repeats": 5, "seed": 4,
-            "parameters": {"ice.concentration": [0.2, 0.5]}
-        }))
+    (tmp_path / "study.yml").write_text(json.dumps({"title": "tiny", "base": "base.yml", "repeats": 5, "seed": 4,
+                                                    "parameters": {"ice.concentration": [0.2, 0.5]}}))
     assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
     result = script("statistics", tmp_path / "all", "--resamples", 9)
     assert result.returncode == 0, result.stderr

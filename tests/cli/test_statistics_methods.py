@@ -150,9 +150,8 @@ def test_fits_see_no_strides(monkeypatch):
 
 def test_anderson_darling_is_scipys():
     x = stats.norm(0, 1).rvs(80, random_state=1)
-    assert stat_fit.anderson_darling(x,
-                                     stats.norm(x.mean(),
-                                                x.std(ddof=1)).cdf) == pytest.approx(stats.anderson(x).statistic)
+    assert stat_fit.anderson_darling(x, stats.norm(x.mean(),
+                                                   x.std(ddof=1)).cdf) == pytest.approx(stats.anderson(x).statistic)
 
 
 def test_p_values_are_uniform_where_the_model_is_true_and_small_where_it_is_not():
@@ -276,10 +275,8 @@ def test_profile_intervals_of_block_maxima_are_those_of_the_likelihood_region():
     x, shares = 200 + 30 * stats.genextreme(-0.2).rvs(40, random_state=16), (0.05, 0.002)
     location, scale, shape = stat_fit.gev(x)
     levels, shape_ends = stat_extreme.gev_intervals([x[i::4] for i in range(4)], location, scale, shape, shares)
-    a, b, k = np.meshgrid(location + scale * np.linspace(-0.8, 0.8, 70),
-                          scale * np.linspace(0.5, 2.0, 70),
-                          shape + np.linspace(-0.5, 0.7, 80),
-                          indexing="ij")
+    a, b, k = np.meshgrid(location + scale * np.linspace(-0.8, 0.8, 70), scale * np.linspace(0.5, 2.0, 70),
+                          shape + np.linspace(-0.5, 0.7, 80), indexing="ij")
     with np.errstate(all="ignore"):
         minus = sum(np.log(b) + (1 + 1 / k) * np.log(1 + k * (v - a) / b) + (1 + k * (v - a) / b)**(-1 / k) for v in x)
     frozen = stats.genextreme(-shape, loc=location, scale=scale)

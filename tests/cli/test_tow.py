@@ -113,16 +113,13 @@ def test_the_resolved_case_gives_the_same_run(towed, tmp_path):
 
 
 def test_branches_break_and_the_body_drifts(tmp_path):
-    case = changed(VESSEL,
-                   run__duration=400,
-                   tow__line__breaking_load="150 kN",
+    case = changed(VESSEL, run__duration=400, tow__line__breaking_load="150 kN",
                    tow__branch2={"breaking_load": "120 kN"})
     r = run(tmp_path, case)
     e = [v for v in events(r) if v[1] != "waypoint"]
     assert [v[1] for v in e] == ["line_broken", "line_broken", "adrift"]
-    assert [(j["time_s"], j["kind"], j["subject"], j["value"])
-            for j in r.summary["events"]
-            if j["kind"] != "waypoint"] == e
+    assert [(j["time_s"], j["kind"], j["subject"],
+             j["value"]) for j in r.summary["events"] if j["kind"] != "waypoint"] == e
     time, one, two = r.series("time", "line_tension_1", "line_tension_2")
     for when, _, branch, value in e[:2]:
         tension, load = (one, 150e3) if branch == 1 else (two, 120e3)
@@ -136,10 +133,8 @@ def test_branches_break_and_the_body_drifts(tmp_path):
 def test_a_prescribed_body_follows_its_waypoints(tmp_path):
     """Mode speed through ice on a path with a corner: velocity along the course, yaw kept, forces along the course of
     the time."""
-    case = changed(VESSEL,
-                   run__duration=500,
-                   water=None,
-                   tow={"mode": "speed", "speed": 1, "ramp": 0, "waypoints": [[-400, -200], [-400, 300]]})
+    case = changed(VESSEL, run__duration=500, water=None, tow={"mode": "speed", "speed": 1, "ramp": 0,
+                                                               "waypoints": [[-400, -200], [-400, 300]]})
     r = run(tmp_path, case, "--quiet")
     time, x, y, yaw, tow, ice, drag, inertia = r.series("time", "body_x", "body_y", "body_yaw", "tow_force",
                                                         "ice_resistance", "drag_force", "inertia_force")
@@ -151,10 +146,8 @@ def test_a_prescribed_body_follows_its_waypoints(tmp_path):
 
 
 def test_a_wall_or_a_pier_on_the_way_is_refused(tmp_path):
-    walled = changed(VESSEL,
-                     domain__ends="wall",
-                     domain__sides="wall",
-                     tow={"mode": "speed", "speed": 1, "waypoints": [[-400, -200], [-400, 500]]})
+    walled = changed(VESSEL, domain__ends="wall", domain__sides="wall", tow={"mode": "speed", "speed": 1,
+                                                                             "waypoints": [[-400, -200], [-400, 500]]})
     r = run(tmp_path, walled, code=CASE, name="a")
     assert "into a wall" in r.result.stderr
     pier = changed(VESSEL,

@@ -19,10 +19,7 @@ PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test
 def run(tmp_path_factory):
     make(PROGRAM)
     folder = tmp_path_factory.mktemp("run")
-    done = subprocess.run([ROOT / PROGRAM, "write", folder],
-                          check=True,
-                          stdout=subprocess.PIPE,
-                          text=True,
+    done = subprocess.run([ROOT / PROGRAM, "write", folder], check=True, stdout=subprocess.PIPE, text=True,
                           errors="replace")
     (folder / "table.txt").write_text(done.stdout, encoding="utf-8")
     return folder

@@ -29,10 +29,8 @@ def means(tmp_path_factory):
     jobs = {(c, study, seed): [f"ice.seed={seed}", *settings]
             for c in (20, 50, 80) for study, settings in STUDIES.items() for seed in SEEDS}
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = {
-            k: pool.submit(tow, folder, k[0], "-".join(map(str, k)).replace(" / ", "_"), v)
-            for k, v in jobs.items()
-        }
+        futures = {k: pool.submit(tow, folder, k[0], "-".join(map(str, k)).replace(" / ", "_"), v) for k,
+                   v in jobs.items()}
         runs = {k: f.result() for k, f in futures.items()}
     table = {}
     for c in (20, 50, 80):

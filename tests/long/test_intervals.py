@@ -33,16 +33,9 @@ def members(tmp_path_factory):
     for seed in SEEDS:
         folder = tmp_path_factory.mktemp("intervals")
         (folder / "study.yml").write_text(json.dumps(dict(STUDY, seed=seed)))
-        command = [
-            *harness.launcher(2),
-            str(harness.BERGTOW), "ensemble", "study.yml", "-o", "out", "--threads", "1"
-        ]
-        subprocess.run(command,
-                       cwd=folder,
-                       check=True,
-                       env=harness.environment(OMP_NUM_THREADS=1),
-                       stdout=subprocess.DEVNULL,
-                       timeout=7200)
+        command = [*harness.launcher(2), str(harness.BERGTOW), "ensemble", "study.yml", "-o", "out", "--threads", "1"]
+        subprocess.run(command, cwd=folder, check=True, env=harness.environment(OMP_NUM_THREADS=1),
+                       stdout=subprocess.DEVNULL, timeout=7200)
         found = [json.loads(p.read_text()) for p in sorted(folder.glob("out/members/*/summary.json"))]
         assert len(found) == 4 * FIELDS
         for i, condition in enumerate(conditions):

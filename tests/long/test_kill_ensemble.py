@@ -15,17 +15,10 @@ from harness import DONE, TOW, changed, differing, write_case
 from resuming import done, started
 
 KILLS, EVERY, STEPS = 10, 20, 400
-BASE = changed(TOW,
-               run__duration=STEPS / 10,
-               domain__length=40,
-               domain__width=16,
-               ice__concentration=0.6,
-               output__window_start=10,
-               output__checkpoint_steps=EVERY)
-STUDY = {
-    "title": "killed", "base": "base.yml", "seed": 3,
-    "parameters": {"ice.concentration": [0.5, 0.7], "tow.speed": [0.1, 0.2]}
-}
+BASE = changed(TOW, run__duration=STEPS / 10, domain__length=40, domain__width=16, ice__concentration=0.6,
+               output__window_start=10, output__checkpoint_steps=EVERY)
+STUDY = {"title": "killed", "base": "base.yml", "seed": 3, "parameters": {"ice.concentration": [0.5, 0.7],
+                                                                          "tow.speed": [0.1, 0.2]}}
 CALL = ("ensemble", "study.yml", "-o", "all", "--threads", 1)
 
 

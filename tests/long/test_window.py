@@ -25,11 +25,8 @@ def test_the_mean_is_that_of_a_long_domain(tmp_path, concentration):
     mean, error = [], []
     for seed in 1, 2:
         for name, case in ("long", LONG), ("window", WINDOW):
-            r = run(tmp_path,
-                    changed(case, ice__concentration=concentration, ice__seed=seed),
-                    "--quiet",
-                    name=f"{name}{seed}",
-                    timeout=600)
+            r = run(tmp_path, changed(case, ice__concentration=concentration, ice__seed=seed), "--quiet",
+                    name=f"{name}{seed}", timeout=600)
             s = r.summary
             print(name, concentration, seed, s["mean_ice_resistance_n"], s["mean_ice_resistance_se_n"],
                   s["moving_window"])

@@ -31,15 +31,8 @@ def one(request, tmp_path_factory):
 @pytest.mark.parametrize("ranks, threads", quick([(1, 3), (2, 1), (2, 2), (3, 2)], (2, 2)))
 def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     folder, alone = one
-    result = subprocess.run([
-        *launcher(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}x{threads}", "--threads",
-        str(threads)
-    ],
-                            cwd=folder,
-                            env=environment(),
-                            capture_output=True,
-                            text=True,
-                            timeout=100)
+    result = subprocess.run([*launcher(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}x{threads}", "--threads",
+                             str(threads)], cwd=folder, env=environment(), capture_output=True, text=True, timeout=100)
     assert result.returncode == DONE, result.stderr
     many = Run(folder / f"out{ranks}x{threads}", result)
     assert differing(alone.dir / "result.h5", many.dir / "result.h5") == []
@@ -51,11 +44,8 @@ def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
 @pytest.mark.slow
 def test_counted_over_the_window_that_is_found(tmp_path):
     """On two ranks, and after stops before the window begins and within it, on other ranks each time."""
-    case = changed(TOW,
-                   tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},
-                   body={"shape": "square", "length": 1.6, "y": 0.5, "x": 3},
-                   run__duration=60,
-                   output={"panels": True},
+    case = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},
+                   body={"shape": "square", "length": 1.6, "y": 0.5, "x": 3}, run__duration=60, output={"panels": True},
                    impact__panels=24)
     alone = run(tmp_path, case, "--threads", 1)
     start = assert_counted_over_the_window(alone)

@@ -19,10 +19,7 @@ WINDOW = changed(ALL,
                  ice__rafting={"kappa": 6},
                  ice__crushing={"pressure": "100 Pa", "least_length": 0.5},
                  run__duration=24)
-JAM = changed(LINE,
-              ice__rafting={"kappa": 8},
-              ice__thickness_law="lognormal",
-              domain__ends_closing=0.15,
+JAM = changed(LINE, ice__rafting={"kappa": 8}, ice__thickness_law="lognormal", domain__ends_closing=0.15,
               run__duration=20)
 CASES = {"window": WINDOW, "jam": JAM}
 

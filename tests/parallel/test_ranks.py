@@ -56,33 +56,20 @@ SEAMS = {
     "output": {"frame_interval": 10},
 }
 # A berg that goes round a channel without ends.
-ROUND = changed(LINE,
-                domain={"length": 24, "width": 16, "ends": "periodic"},
-                ice={"concentration": 0.5, "size": 1},
-                run__duration=50,
-                run__dt=0.1,
-                body__x=3,
-                tow__speed=0.8)
+ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ice={"concentration": 0.5, "size": 1},
+                run__duration=50, run__dt=0.1, body__x=3, tow__speed=0.8)
 # The same where the tide turns, in a managed lead: nothing rests, and between the walls the cells go with the water.
-TIDE = changed(ROUND,
-               run__dt=0.05,
-               run__duration=25,
-               water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}},
-               tow__mode="line",
+TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20,
+                                                                      "inclination": 60}}, tow__mode="line",
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
 # Ice that crushes: what a pair has crushed stays with it when its cell is assigned to another rank, and when cells are
 # labelled anew.
-CRUSH = changed(LINE,
-                ice__crushing={"pressure": "2 kPa", "least_length": 0.5},
-                ice__thickness_law="lognormal",
-                domain__ends_closing=0.1,
-                run__duration=26)
+CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal",
+                domain__ends_closing=0.1, run__duration=26)
 # A ring of cells in packed ice: many lists, and rounds over a part of them. From rest: what drifts as a whole gives no
 # rank more to do than another.
-RING = changed(SEAMS,
-               domain__length=16,
-               domain__width=90,
-               ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal", "start": "rest"})
+RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1,
+                                                                "thickness_law": "lognormal", "start": "rest"})
 CASES = {
     "line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH, "ring": RING
 }
@@ -225,8 +212,7 @@ def test_floes_at_a_free_body_that_other_ranks_hold(tmp_path):
 
 
 @pytest.mark.parametrize("name, ranks, threads", quick([("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
-                                                         ("ring", 2, 2), ("ring", 4, 1)],
-                                                        ("jam", 3, 1)))
+                                                        ("ring", 2, 2), ("ring", 4, 1)], ("jam", 3, 1)))
 def test_the_division_is_sound(alone, name, ranks, threads):
     """In the validation build: every body that several ranks hold is the same there, bit for bit, after each migration
     and every 20 steps; threads share every loop, however few the contacts. And another optimisation gives the same

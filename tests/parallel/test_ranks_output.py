@@ -37,10 +37,7 @@ def command(ranks, *arguments):
 
 def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, env=None, **more):
     done = subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
-                          env=env or environment(OMP_NUM_THREADS=1),
-                          capture_output=True,
-                          text=True,
-                          timeout=timeout,
+                          env=env or environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=timeout,
                           **more)
     # prterun of Open MPI 5 puts null bytes into what it hands on when a program calls MPI_Abort
     done.stdout, done.stderr = done.stdout.replace("\0", ""), done.stderr.replace("\0", "")
@@ -165,14 +162,8 @@ def test_a_disk_that_fills_up_in_the_run(tmp_path, rank):
     """For one rank only: the others must hear of it. Without shared memory, whose files would be too large too."""
     write_case(tmp_path, changed(SHORT, output__frame_interval=0.1))
     limited = f'[ "{RANK}" != {rank} ] || ulimit -f 1600; exec "$@"'
-    result = mpirun(3,
-                    "run",
-                    "case.yml",
-                    "-o",
-                    "out",
-                    program=("bash", "-c", limited, "bash", BERGTOW),
-                    options=("--mca", "btl", "self,tcp", "--mca", "btl_tcp_if_include", "lo"),
-                    cwd=tmp_path)
+    result = mpirun(3, "run", "case.yml", "-o", "out", program=("bash", "-c", limited, "bash", BERGTOW),
+                    options=("--mca", "btl", "self,tcp", "--mca", "btl_tcp_if_include", "lo"), cwd=tmp_path)
     assert result.returncode == IO, result.stderr
     assert len(ours(result)) == 1 and "out/result.part.h5: cannot write the file: File too large; raise" in ours(
         result)[0], result.stderr
@@ -208,11 +199,8 @@ def start(tmp_path):
 
     def begin():
         write_case(tmp_path, LONG)
-        p = subprocess.Popen(command(3, BERGTOW, "run", "case.yml", "-o", "out", "--threads", 1),
-                             cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1),
-                             stdout=subprocess.PIPE,
-                             stderr=subprocess.PIPE,
+        p = subprocess.Popen(command(3, BERGTOW, "run", "case.yml", "-o", "out", "--threads", 1), cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                              text=True)
         running.append(p)
 

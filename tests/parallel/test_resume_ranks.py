@@ -77,13 +77,8 @@ def kill_and_resume(folder, name, path, share):
     command = ["run", "case.yml", "-o", name]
     for k in range(40):
         ranks = [2, 1, 2, 3][k % 4]
-        if killed_after((0.2 + moments.random()) * share * (0.5 + 0.5 * ranks),
-                        ranks,
-                        *command,
-                        "--quiet",
-                        "--threads",
-                        1,
-                        cwd=folder):
+        if killed_after((0.2 + moments.random()) * share * (0.5 + 0.5 * ranks), ranks, *command, "--quiet", "--threads",
+                        1, cwd=folder):
             kills += (folder / name).exists()
             check_readable(folder / name)
             if not list((folder / name).glob("checkpoint*.h5")):

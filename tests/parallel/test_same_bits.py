@@ -18,14 +18,9 @@ pytestmark = pytest.mark.one_rank
 ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 
 # A heavy body on a line among the same floes: rows of the large body, the line's own row, and restitution.
-LINE = changed(
-    PRESS,
-    domain__ends_closing=0,
-    domain__sides_closing=0,
-    body={"shape": "disc", "length": 6, "x": 8},
-    tow={"mode": "line", "speed": 0.5, "ramp": 0, "line_length": 2, "line_damping": 0, "hull_y": 1, "hull_x": 2},
-    ice__restitution=0.3,
-    run__duration=3)
+LINE = changed(PRESS, domain__ends_closing=0, domain__sides_closing=0, body={"shape": "disc", "length": 6, "x": 8},
+               tow={"mode": "line", "speed": 0.5, "ramp": 0, "line_length": 2, "line_damping": 0, "hull_y": 1,
+                    "hull_x": 2}, ice__restitution=0.3, run__duration=3)
 # Periodic both ways, restless and under every force, in a tide that turns: floes cross the seams.
 SEAMS = changed(
     PRESS,
@@ -139,14 +134,7 @@ def test_the_resolved_case_is_the_same_case(tmp_path, case):
 
 
 def test_overrides_stand_in_the_resolved_case(tmp_path):
-    given = run(tmp_path,
-                TOW,
-                "--set",
-                "ice.seed=7",
-                "--set",
-                "tow.speed=0.2",
-                "--set",
-                "run.duration=10",
+    given = run(tmp_path, TOW, "--set", "ice.seed=7", "--set", "tow.speed=0.2", "--set", "run.duration=10",
                 name="given")
     again = run(tmp_path, given.dir / "case.resolved.yml", name="again")
     written = run(tmp_path, changed(TOW, ice__seed=7, tow__speed=0.2, run__duration=10), name="written")

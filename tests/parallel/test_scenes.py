@@ -16,9 +16,7 @@ from harness import BERGTOW, DONE
 RECORDED_WITH, STORED = scenes.stored()
 
 # Keys that no scene sets, and why.
-LEFT_OUT = {
-    "run.threads": "said by the layout", "output.progress": "what is printed while a run is on",
-}
+LEFT_OUT = {"run.threads": "said by the layout", "output.progress": "what is printed while a run is on", }
 
 
 def both():
@@ -39,6 +37,7 @@ def test_scene_is_what_it_was(tmp_path, name, layout):
                                                 "tests/scenes.py --compare shows how, --record takes it over")
 
 
+@pytest.mark.one_rank
 def test_what_is_stored_is_of_these_scenes():
     """Each by itself: two scenes that leave the same would be one, with a key that has no effect."""
     assert sorted(STORED) == sorted(scenes.SCENES)
@@ -70,6 +69,7 @@ def unused(keys, sections):
             yield key["name"]
 
 
+@pytest.mark.one_rank
 def test_the_scenes_use_every_key():
     """Every key away from its default, and every value of a choice; those of floes by hand, too."""
     p = subprocess.run([BERGTOW, "--list-keys", "--json"], capture_output=True, text=True)
@@ -79,6 +79,7 @@ def test_the_scenes_use_every_key():
     assert list(unused(listed["floe_keys"], [floe for case in cases for floe in case.get("floes", ())])) == []
 
 
+@pytest.mark.one_rank
 def test_the_scenes_use_every_layout():
     pairs = {scenes.layouts_of(name) for name in scenes.SCENES}
     assert all(first != second for first, second in pairs)

@@ -45,9 +45,8 @@ static bt_world *hull_and_floe(double dt, double turn, double speed, double slop
 static double pressed(const bt_world *w) { return w->stats.added[0][2]; }
 
 /// A floe that comes with its corner first is stopped at F0 d + ½ k d² = ½ m v², and what it lost is the fender's work.
-static void it_takes_the_energy_of_a_floe(void **state)
+TEST(it_takes_the_energy_of_a_floe)
 {
-    (void)state;
     for (int i = 0; i < 3; i++) {
         const double speed = (double[]){0.2, 0.5, 1}[i], energy = 0.5 * sheet * speed * speed;
         bt_world *w = hull_and_floe(5e-4, BT_PI / 4, speed, 0);
@@ -68,9 +67,8 @@ static void it_takes_the_energy_of_a_floe(void **state)
 }
 
 /// Edge on, two points bear: a steady force presses the fender until 2 (F0 + k d) is the force, and no deeper.
-static void it_creeps_until_it_bears(void **state)
+TEST(it_creeps_until_it_bears)
 {
-    (void)state;
     const double force[] = {0.9 * 2 * soft, 1.5 * 2 * soft, 3 * 2 * soft};
     for (int i = 0; i < 3; i++) {
         bt_world *w = hull_and_floe(2e-3, 0, 0, force[i] / sheet);
@@ -86,9 +84,8 @@ static void it_creeps_until_it_bears(void **state)
 }
 
 /// The length that a law is given is that between points which may close, whether the search finds others or not.
-static void its_length_is_what_may_close(void **state)
+TEST(its_length_is_what_may_close)
 {
-    (void)state;
     for (int i = 0; i < 4; i++) {
         const bool turned = i > 1, fast = i % 2;
         const double yaw = turned ? 0.03 : 0;
@@ -109,9 +106,8 @@ static void its_length_is_what_may_close(void **state)
 }
 
 /// What is not towed has no fender: a wall stops the same floe at its surface.
-static void it_is_the_hull_s_alone(void **state)
+TEST(it_is_the_hull_s_alone)
 {
-    (void)state;
     bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
     w->towed = -1;
     for (int s = 0; s < 300; s++) bt_world_step(w);
@@ -121,9 +117,8 @@ static void it_is_the_hull_s_alone(void **state)
 }
 
 /// Of two laws the weaker yields: ice that crushes under less than the fender leaves the fender whole.
-static void the_weaker_law_yields(void **state)
+TEST(the_weaker_law_yields)
 {
-    (void)state;
     for (int i = 0; i < 2; i++) {
         bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
         double *own = w->par.law_own[BT_LAW_CRUSHING];
@@ -140,9 +135,8 @@ static void the_weaker_law_yields(void **state)
 }
 
 /// Memory names its law by a number: a program with other laws before this one would take it for one of theirs.
-static void a_state_of_other_laws_is_refused(void **state)
+TEST(a_state_of_other_laws_is_refused)
 {
-    (void)state;
     static const char *const had[] = {"fender", "fender, grip", "grip, fender"};
     for (int k = 0; k < 3; k++) {
         bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0), *other = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
@@ -168,9 +162,8 @@ static void a_state_of_other_laws_is_refused(void **state)
     }
 }
 
-static void what_will_not_do_is_refused(void **state)
+TEST(what_will_not_do_is_refused)
 {
-    (void)state;
     static const bt_law_key furlong[] = {{"load", "furlong", "0", "[0, 1]", "a load of something"}};
     static const bt_contact_number lonely[] = {{"bits", "1", "something that nothing counts", true}};
     static const bt_contact_number taken[] = {{"contacts", "1", "a series that is there", false}},
@@ -203,9 +196,8 @@ static void what_will_not_do_is_refused(void **state)
 }
 
 /// The arrays that hold them have room, and each series names a total of the summary.
-static void numbers_of_the_laws_have_their_places(void **state)
+TEST(numbers_of_the_laws_have_their_places)
 {
-    (void)state;
     assert_true(bt_law_first_number(BT_LAWS) <= BT_MAX_LAW_NUMBERS && bt_law_first_total(BT_LAWS) <= BT_MAX_LAW_TOTALS);
     for (int law = 0; law < BT_LAWS; law++) {
         const bt_law *l = bt_laws[law];
@@ -222,13 +214,5 @@ int main(void)
     bt_contact_law watched = fender_law;
     watched.bound = watch;
     if (bt_contact_register(&watched, &err) != BT_OK) bt_errors_print(&err);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(it_takes_the_energy_of_a_floe), cmocka_unit_test(it_creeps_until_it_bears),
-        cmocka_unit_test(its_length_is_what_may_close),
-        cmocka_unit_test(it_is_the_hull_s_alone),        cmocka_unit_test(the_weaker_law_yields),
-        cmocka_unit_test(a_state_of_other_laws_is_refused),
-        cmocka_unit_test(what_will_not_do_is_refused),
-        cmocka_unit_test(numbers_of_the_laws_have_their_places),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -46,9 +46,8 @@ static double pushed(const bt_world *w)
 
 /// A steady force (the slope of the sea surface) presses a floe edge-on against a wall, limit F = p h L. Below the
 /// limit it stands still; above, it goes on with the acceleration a − F/m into the ice, whose resistance stays F.
-static void pressed_against_a_wall(void **state)
+TEST(pressed_against_a_wall)
 {
-    (void)state;
     const double h = 0.1, limit = pressure * h, dt = 0.005, shares[] = {0.3, 0.999, 1.001, 1.5};
     for (int i = 0; i < 4; i++) {
         bt_params p = params(dt);
@@ -76,9 +75,8 @@ static void pressed_against_a_wall(void **state)
 
 /// A floe hits a wall edge-on: it stops after t = m v/(p h L), at the depth m v²/(2 p h L), and crushing has taken its
 /// energy.
-static void stop_at_constant_force(void **state)
+TEST(stop_at_constant_force)
 {
-    (void)state;
     // the way to the wall crushes nothing
     const double h = 0.1, v = 2, dt = 1e-4, brake = pressure * h / sheet, gap = 1.37 * v * dt;
     bt_params p = params(dt);
@@ -104,9 +102,8 @@ static void stop_at_constant_force(void **state)
 /// A corner is crushed at a wall while the next one is far from it, or just beyond the slop. A fast floe in the
 /// neighbourhood makes the search look farther ahead and find that corner, too, which must not change what the first
 /// one bears.
-static void the_margin_of_the_search(void **state)
+TEST(the_margin_of_the_search)
 {
-    (void)state;
     const double dt = 1e-4;
     const struct { double yaw, slop; int steps; } at[] = {{0.03, 1e-6, 20}, {1.1e-3, 1e-3, 1}};
     for (int i = 0; i < 2; i++) {
@@ -147,9 +144,8 @@ static bt_idx contact_with_last(bt_world *w, bt_cell **at)
 }
 
 /// Which points take part: by the speed before the step and by the free one, and what lies beside the nearest.
-static void points_that_take_part(void **state)
+TEST(points_that_take_part)
 {
-    (void)state;
     bt_params p = params(0.01);
     p.slop = 1e-3;
     bt_world *w = bt_world_create(&p);
@@ -187,9 +183,8 @@ static void points_that_take_part(void **state)
 
 /// A point beside the nearest one is found though it lies beyond the margin, where a law bounds the load; rigid
 /// contacts need none.
-static void a_point_beside_the_nearest_is_found(void **state)
+TEST(a_point_beside_the_nearest_is_found)
 {
-    (void)state;
     for (int crushes = 0; crushes < 2; crushes++) {
         bt_params p = params(0.01);
         p.slop = 1e-3;
@@ -210,9 +205,8 @@ static void a_point_beside_the_nearest_is_found(void **state)
 
 /// A floe at rest is pushed across a gap and shut against a wall by another one: whether its edge lies true or is
 /// turned a little, both of its ends bear.
-static void pushed_shut(void **state)
+TEST(pushed_shut)
 {
-    (void)state;
     const double h = 0.1, dt = 0.01, yaw[] = {0, 1e-12, -1e-12, 1e-4};
     for (int i = 0; i < 4; i++) {
         bt_params p = params(dt);
@@ -237,9 +231,8 @@ static void pushed_shut(void **state)
 
 /// Two corners are crushed; the floe is turned until one is farther off than the search looks. Found or not, it remains
 /// as deep.
-static void a_corner_out_of_sight_is_not_forgotten(void **state)
+TEST(a_corner_out_of_sight_is_not_forgotten)
 {
-    (void)state;
     for (int fast = 0; fast < 2; fast++) {
         bt_params p = params(1e-3);
         bt_world *w = bt_world_create(&p);
@@ -279,9 +272,8 @@ static void drive(bt_world *w, double vx, double vy, int steps, double *overlap)
 
 /// A corner is crushed, slides off the end of the edge and gets another name there, is crushed deeper, and slides back:
 /// that the first name was less deep brings no overlap back.
-static void sliding_back_brings_no_overlap(void **state)
+TEST(sliding_back_brings_no_overlap)
 {
-    (void)state;
     const double yaw = -0.06;
     bt_params p = params(1e-3);
     p.slop = 1e-3;
@@ -305,9 +297,8 @@ static void sliding_back_brings_no_overlap(void **state)
 
 /// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed,
 /// over the part, with the reduced mass; they end with the common velocity.
-static void two_floes(void **state)
+TEST(two_floes)
 {
-    (void)state;
     const double v = 1, dt = 1e-4;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -344,9 +335,8 @@ static void two_floes(void **state)
 
 /// A corner of angle φ: a spring k = 2 p h tan(φ/2) that never gives back, depth v √(m/k), after a quarter of the
 /// period.
-static void corner(void **state)
+TEST(corner)
 {
-    (void)state;
     const double h = 0.1, v = 0.5, angles[] = {90, 40, 140};
     for (int i = 0; i < 3; i++) {
         const double half = 0.5 * angles[i] * BT_PI / 180;
@@ -394,9 +384,8 @@ static void corner(void **state)
 
 /// A floe of 30 m at full scale meets a wall by its face, a corner, a disc's rim, at 0.5 m/s, from a gap to cross
 /// first or none: its depth is the one at which crushing has taken its kinetic energy, and its work that energy.
-static void energy_at_any_time_step(void **state)
+TEST(energy_at_any_time_step)
 {
-    (void)state;
     const double p0 = 1.5e6, h = 1, v = 0.5, steps[] = {0.002, 0.01, 0.05, 0.1, 0.2, 0.5, 1, 2, 5},
                  gaps[] = {0, 0.03, 0.37, 0.9};
     enum { FACE, CORNER, BLUNT, RIM, SHAPES };
@@ -458,9 +447,8 @@ static void energy_at_any_time_step(void **state)
 
 /// A corner at rest that a steady force L presses into a wall from now on goes in to 2 L/κ, F = κ d, where the force
 /// has given what crushing took. An edge shorter than the least length bears p h times that, both of its ends together.
-static void pressed_from_rest(void **state)
+TEST(pressed_from_rest)
 {
-    (void)state;
     const double h = 0.1, kappa = 2 * pressure * h, steps[] = {0.0005, 0.005, 0.05};
     for (int j = 0; j < 3; j++) {
         bt_params p = params(steps[j]);
@@ -492,9 +480,8 @@ static void pressed_from_rest(void **state)
 
 /// In company the work of crushing is the energy lost, too, whatever the step: a heavy body comes in on a row of floes
 /// that lies against a wall, by a face or a corner; and one of four floes that touch ends with their common velocity.
-static void energy_in_company(void **state)
+TEST(energy_in_company)
 {
-    (void)state;
     const double p0 = 1.5e6, h = 1, v = 0.5, side = 30, sheet_1m = 910, half = 0.5 * side, reach = side / sqrt(2),
                  steps[] = {0.002, 0.02, 0.1, 0.5, 1, 2, 5};
     enum { FACE, TIP, FREE, KINDS };
@@ -531,9 +518,8 @@ static void energy_in_company(void **state)
 }
 
 /// The end of a hit is where its curve meets the contact's own equation, and E has no step at the kink.
-static void the_curve_of_a_hit(void **state)
+TEST(the_curve_of_a_hit)
 {
-    (void)state;
     uint64_t rng = 4;
     int ends = 0;
     for (int trial = 0; trial < 20000; trial++) {
@@ -557,9 +543,8 @@ static void the_curve_of_a_hit(void **state)
 
 /// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what
 /// crushing takes is the kinetic energy lost.
-static void friction_from_the_limit(void **state)
+TEST(friction_from_the_limit)
 {
-    (void)state;
     const double h = 0.1, v = 1, slide = 3, mu = 0.2, dt = 1e-4, brake = pressure * h / sheet;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -593,9 +578,8 @@ static void friction_from_the_limit(void **state)
 
 /// What is crushed stays so: the floe stands in its dent, leaves it, comes back without a force up to the dent's
 /// bottom; once it has been farther away than the memory reaches, it meets the wall's face again.
-static void memory(void **state)
+TEST(memory)
 {
-    (void)state;
     const double h = 0.1, v = 2, dt = 1e-3, back = 0.05;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -634,9 +618,8 @@ static void memory(void **state)
 
 /// With restitution the floe rebounds once the limit bears it; it never comes back faster than e v, and crushing gives
 /// no energy.
-static void rebound_below_the_limit(void **state)
+TEST(rebound_below_the_limit)
 {
-    (void)state;
     const double h = 0.1, v = 2, e = 0.6, dt = 0.002, brake = pressure * h / sheet;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -665,9 +648,8 @@ static void rebound_below_the_limit(void **state)
 
 /// A body at a set speed presses a row of floes against a wall. Rigid, no force would do; here it is at most p h L of
 /// the weakest.
-static void body_at_a_set_speed(void **state)
+TEST(body_at_a_set_speed)
 {
-    (void)state;
     const double dt = 0.1, h = 0.1;
     bt_params p = params(dt);
     p.tolerance = 1e-9;
@@ -699,9 +681,8 @@ static void body_at_a_set_speed(void **state)
 
 /// A jam of floes that crush and raft, solved badly: whatever the impulses are, crushed ice does not grow back, and a
 /// pair that has rafted measures its contact from the edges, not from what was crushed before.
-static void laws_of_a_jam(void **state)
+TEST(laws_of_a_jam)
 {
-    (void)state;
     const double h = 0.1, speed = 0.5;
     bt_params p = params(0.01);
     p.max_sweeps = 1; // far off, up to three times that
@@ -739,9 +720,8 @@ static void laws_of_a_jam(void **state)
 
 /// A floe in two parts crushes against a wall. What one part crushed stands open to the other too: a contact that finds
 /// no point of its own in the records goes by the deepest of them.
-static void parts_share_their_dent(void **state)
+TEST(parts_share_their_dent)
 {
-    (void)state;
     bt_params p = params(1e-3);
     bt_world *w = bt_world_create(&p);
     double v[] = {0.5, -1, 0.5, -0.1, 0, 0, 0.5, 0.1, 0.5, 1, -0.5, 1, -0.5, -1};
@@ -769,29 +749,4 @@ static void parts_share_their_dent(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pressed_against_a_wall),
-        cmocka_unit_test(stop_at_constant_force),
-        cmocka_unit_test(the_margin_of_the_search),
-        cmocka_unit_test(points_that_take_part),
-        cmocka_unit_test(a_point_beside_the_nearest_is_found),
-        cmocka_unit_test(pushed_shut),
-        cmocka_unit_test(a_corner_out_of_sight_is_not_forgotten),
-        cmocka_unit_test(sliding_back_brings_no_overlap),
-        cmocka_unit_test(two_floes),
-        cmocka_unit_test(corner),
-        cmocka_unit_test(energy_at_any_time_step),
-        cmocka_unit_test(pressed_from_rest),
-        cmocka_unit_test(energy_in_company),
-        cmocka_unit_test(the_curve_of_a_hit),
-        cmocka_unit_test(friction_from_the_limit),
-        cmocka_unit_test(memory),
-        cmocka_unit_test(rebound_below_the_limit),
-        cmocka_unit_test(body_at_a_set_speed),
-        cmocka_unit_test(laws_of_a_jam),
-        cmocka_unit_test(parts_share_their_dent),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -57,9 +57,8 @@ static bt_impulse drag_of(const bt_world *w)
 }
 
 /// Force and moment on a body that is led, any outline, drift and turn, water and air at once.
-static void force_and_moment_are_the_integral(void **state)
+TEST(force_and_moment_are_the_integral)
 {
-    (void)state;
     uint64_t rng = 1;
     for (int trial = 0; trial < 40; trial++) {
         double v[2 * 12];
@@ -86,9 +85,8 @@ static void force_and_moment_are_the_integral(void **state)
 
 /// On a body that is led, deflection and the tilt that balances the current bear f k×(U − U_w) of its mass, along and
 /// across.
-static void a_led_body_is_deflected(void **state)
+TEST(a_led_body_is_deflected)
 {
-    (void)state;
     uint64_t rng = 7;
     for (int trial = 0; trial < 10; trial++) {
         double v[8];
@@ -110,9 +108,8 @@ static void a_led_body_is_deflected(void **state)
 }
 
 /// An outline with a bay has the drag of its hull, and in translation that of its width.
-static void a_bay_is_passed_by(void **state)
+TEST(a_bay_is_passed_by)
 {
-    (void)state;
     double bay[] = {-3, -1, 3, -1, 3, 2, 1, 2, 0, -0.5, -1, 2, -3, 2},
            hull[] = {-3, -1, 3, -1, 3, 2, 1, 2, -1, 2, -3, 2};
     bt_moments m = bt_shape_moments(7, bay);
@@ -148,9 +145,8 @@ static void a_bay_is_passed_by(void **state)
 
 /// One step of any length: the velocity relative to the fluid loses energy and does not turn round, drift and rotation
 /// together.
-static void drag_never_reverses(void **state)
+TEST(drag_never_reverses)
 {
-    (void)state;
     uint64_t rng = 5;
     for (int trial = 0; trial < 400; trial++) {
         double v[2 * 12];
@@ -174,9 +170,8 @@ static void drag_never_reverses(void **state)
 /// A rectangle 2a × 2b that turns in place, against closed forms: pressure has the moment ½ form ω² (a⁴ + b⁴), strip
 /// theory for both pairs of sides; drag along the local flow 2 a² b² form ω² more. And the force on one that does not
 /// turn is the same to the bit, whatever the share.
-static void a_rectangle_that_turns(void **state)
+TEST(a_rectangle_that_turns)
 {
-    (void)state;
     const double a = 40, b = 28, w = 0.005;
     double force[2][2] = {0};
     for (int share = 0; share < 2; share++)
@@ -197,9 +192,8 @@ static void a_rectangle_that_turns(void **state)
 }
 
 /// Slope and Coriolis act on the body without its added mass; in a window, on undisturbed ice alike.
-static void added_mass_takes_no_part(void **state)
+TEST(added_mass_takes_no_part)
 {
-    (void)state;
     enum { FLOES = 3 };
     bt_params p = scene_params(0.5, 1);
     p.coriolis = 1.4e-4, p.tilt_ax = -1e-4, p.period_x = 100, p.water_u = 0.1;
@@ -238,9 +232,8 @@ static void added_mass_takes_no_part(void **state)
 
 /// A square of 30 m with a bay of 22 × 14 m: 164 m around, 120 m around its hull, by which the mean floe has its form
 /// drag, as floes do.
-static void a_bay_adds_no_drag_to_undisturbed_ice(void **state)
+TEST(a_bay_adds_no_drag_to_undisturbed_ice)
 {
-    (void)state;
     double v[] = {-15, -15, 15, -15, 15, -11, 1, -11, 1, 11, 15, 11, 15, 15, -15, 15};
     bt_parts parts;
     bt_params p = scene_params(1, 30);
@@ -257,9 +250,8 @@ static void a_bay_adds_no_drag_to_undisturbed_ice(void **state)
 }
 
 /// Free drift of random bodies in random weather, drag over eight decades: found, and kept by the steps.
-static void free_drift_stays(void **state)
+TEST(free_drift_stays)
 {
-    (void)state;
     uint64_t rng = 9;
     for (int trial = 0; trial < 2000; trial++) {
         bt_params p = scene_params(pow(10, 3 * scene_uniform(&rng) - 1), 1);
@@ -301,9 +293,8 @@ static void free_drift_stays(void **state)
 
 /// A floe at rest goes as soon as one thing pushes it, in whatever direction: on a slope a t exactly, in a wind to its
 /// lee.
-static void what_is_pushed_does_not_rest(void **state)
+TEST(what_is_pushed_does_not_rest)
 {
-    (void)state;
     for (int k = 0; k < 6; k++) {
         bt_params p = scene_params(0.5, 1);
         double *const push[] = {&p.air_u, &p.air_v, &p.water_u, &p.water_v, &p.tilt_ax, &p.tilt_ay};
@@ -325,18 +316,4 @@ static void what_is_pushed_does_not_rest(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(force_and_moment_are_the_integral),
-        cmocka_unit_test(a_led_body_is_deflected),
-        cmocka_unit_test(a_bay_is_passed_by),
-        cmocka_unit_test(drag_never_reverses),
-        cmocka_unit_test(a_rectangle_that_turns),
-        cmocka_unit_test(added_mass_takes_no_part),
-        cmocka_unit_test(a_bay_adds_no_drag_to_undisturbed_ice),
-        cmocka_unit_test(free_drift_stays),
-        cmocka_unit_test(what_is_pushed_does_not_rest),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

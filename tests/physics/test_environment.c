@@ -2,7 +2,6 @@
 // Current and wind in time: ellipse and table by hand, floes that follow the water, what rests and what wakes.
 #include "scene.h"
 
-#include <string.h>
 
 #include "case/case_derived.h"
 #include "force/environment.h"
@@ -29,9 +28,8 @@ static void set_table(bt_table *t, int n, const double *row)
 
 /// Largest along the major axis at phase/2π T; a quarter of a period later along the minor axis, turned from x towards
 /// y.
-static void ellipse_by_hand(void **state)
+TEST(ellipse_by_hand)
 {
-    (void)state;
     bt_case c = tidal_case(0.5, 0.2, 30 * deg, 60 * deg); // largest at 2 h
     c.water.current_x = 0.1, c.water.current_y = -0.05;
     const double x = cos(30 * deg), y = sin(30 * deg);
@@ -57,9 +55,8 @@ static void ellipse_by_hand(void **state)
     bt_case_free(&c);
 }
 
-static void table_by_hand(void **state)
+TEST(table_by_hand)
 {
-    (void)state;
     bt_table t;
     set_table(&t, 4, (const double[]){-1, 0, 2, 3, 4, 2, 4, 4, 0, 10, 1, 1});
     const double want[][3] = {{-5, 0, 2},     {-1, 0, 2}, {0, 1, 2},     {1, 2, 2},  {3, 4, 2},
@@ -93,9 +90,8 @@ static bt_world *disc_world(const bt_case *c, double dt, bt_drag drag)
 /// A floe that clings to the water goes where the water goes: x = (a/ω)(sin(ωt − φ) + sin φ) along the major axis,
 /// y = (b/ω)(cos φ − cos(ωt − φ)). The way of the water is of second order in Δt: it takes the current of the middle of
 /// a step.
-static void light_floe_follows_the_ellipse(void **state)
+TEST(light_floe_follows_the_ellipse)
 {
-    (void)state;
     double error[2];
     for (int k = 0; k < 2; k++) {
         const double dt = k ? 600 : 1200, a = 0.5, b = -0.2, phase = 1, om = 2 * BT_PI / (12 * hour);
@@ -118,9 +114,8 @@ static void light_floe_follows_the_ellipse(void **state)
 
 /// Without drag: with the dynamic tilt a body moves with the water, Coriolis or not. The geostrophic tilt leaves it
 /// behind: of a current u cos ωt along x, Coriolis apart, it knows nothing.
-static void dynamic_tilt_carries_a_body(void **state)
+TEST(dynamic_tilt_carries_a_body)
 {
-    (void)state;
     for (int k = 0; k < 4; k++) {
         const bool dynamic = k & 1, turning = k & 2;
         bt_case c = tidal_case(0.5, turning ? 0.2 : 0, 20 * deg, 1);
@@ -185,9 +180,8 @@ static void check_same_field(const bt_case *c)
 
 /// A field at rest costs nothing and wakes as a whole: when the current sets in, and also when it only changes for
 /// others than the water: a gust.
-static void rest_ends_when_the_water_or_the_wind_moves(void **state)
+TEST(rest_ends_when_the_water_or_the_wind_moves)
 {
-    (void)state;
     const double rows[] = {0, 0, 0, 10, 0, 0, 20, 0.3, -0.1, 30, 0.3, -0.1, 50, 0, 0},
                  gust[] = {0, 0, 0, 10, 0, 0, 11, 20, 0, 12, 0, 0, 50, 0, 0};
     bt_case c;
@@ -203,9 +197,8 @@ static void rest_ends_when_the_water_or_the_wind_moves(void **state)
 
 /// A floe with exactly the water's velocity rests in that step; when the water goes faster in the next, it must not
 /// keep its old velocity.
-static void a_floe_at_rest_follows_a_new_current(void **state)
+TEST(a_floe_at_rest_follows_a_new_current)
 {
-    (void)state;
     bt_case c;
     bt_case_defaults(&c);
     // 0.25 m/s (a power of two) until 10 s. Air moves with the water: calm.
@@ -253,9 +246,8 @@ static bt_world *on_a_wall(void)
 
 /// Velocity zero is not rest where the wall alone holds a floe against wind or slope: it stays active, and the wall
 /// bears the force in each step.
-static void what_a_wall_holds_does_not_rest(void **state)
+TEST(what_a_wall_holds_does_not_rest)
 {
-    (void)state;
     for (int kind = 0; kind < 3; kind++) {
         bt_world *w = on_a_wall();
         if (kind == 1) w->par.air_v = -4;
@@ -273,9 +265,8 @@ static void what_a_wall_holds_does_not_rest(void **state)
 }
 
 /// With the water's velocity and no drag, a floe that turns goes on turning.
-static void what_turns_does_not_rest(void **state)
+TEST(what_turns_does_not_rest)
 {
-    (void)state;
     bt_params p = scene_params(0.5, 1);
     bt_world *w = bt_world_create(&p);
     double v[8];
@@ -292,9 +283,8 @@ static void what_turns_does_not_rest(void **state)
 
 /// Cells go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, cells
 /// of some metres).
-static void cells_go_with_the_tide(void **state)
+TEST(cells_go_with_the_tide)
 {
-    (void)state;
     bt_case c = tidal_case(0.5, 0.3, 40 * deg, 0);
     bt_params p = scene_params(60, 1);
     bt_world *w = bt_world_create(&p);
@@ -322,18 +312,4 @@ static void cells_go_with_the_tide(void **state)
     bt_case_free(&c);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ellipse_by_hand),
-        cmocka_unit_test(table_by_hand),
-        cmocka_unit_test(light_floe_follows_the_ellipse),
-        cmocka_unit_test(dynamic_tilt_carries_a_body),
-        cmocka_unit_test(rest_ends_when_the_water_or_the_wind_moves),
-        cmocka_unit_test(a_floe_at_rest_follows_a_new_current),
-        cmocka_unit_test(what_a_wall_holds_does_not_rest),
-        cmocka_unit_test(what_turns_does_not_rest),
-        cmocka_unit_test(cells_go_with_the_tide),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

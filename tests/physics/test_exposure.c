@@ -43,9 +43,8 @@ static void look(bt_world *w)
 
 static bt_exposure of(const bt_world *w, bt_gid g) { return w->bodies.exposure[bt_world_index(w, g)]; }
 
-static void an_edge_behind_another(void **state)
+TEST(an_edge_behind_another)
 {
-    (void)state;
     const double h[2] = {DRAFT, 1 - DRAFT}; // of 1 m
     for (int k = 0; k < 30; k++) {
         const double gap = 0.01 * pow(1.3, k), angle = 0.37 * k, c = cos(angle), s = sin(angle);
@@ -71,9 +70,8 @@ static void an_edge_behind_another(void **state)
 }
 
 /// Half of the width in the lee; an obstacle half as high; one that is fixed; nothing behind; not in a flow across.
-static void what_stands_ahead_counts(void **state)
+TEST(what_stands_ahead_counts)
 {
-    (void)state;
     bt_world *w = begin(1, 10);
     const bt_gid rear = add_square(w, 10, 1, 0, 0);
     add_square(w, 10, 1, -11, 5); // over the lower half of the width: y < 0 is free
@@ -111,9 +109,8 @@ static double drag_along(const bt_world *w, double dt)
 }
 
 /// In a current and in wind, without form drag.
-static void a_raft_of_two_has_the_skin_of_what_it_covers(void **state)
+TEST(a_raft_of_two_has_the_skin_of_what_it_covers)
 {
-    (void)state;
     uint64_t rng = 4;
     for (int trial = 0; trial < 60; trial++) {
         bt_world *w = begin(1e-6, 8);
@@ -150,9 +147,8 @@ static bool inside(const bt_world *w, bt_idx i, double x, double y)
 }
 
 /// Sum over the sheets = what they cover together, by points of a lattice.
-static void a_pile_has_the_skin_of_what_it_covers(void **state)
+TEST(a_pile_has_the_skin_of_what_it_covers)
 {
-    (void)state;
     enum { LATTICE = 400 };
     uint64_t rng = 11;
     double worst = 0;
@@ -187,9 +183,8 @@ static void a_pile_has_the_skin_of_what_it_covers(void **state)
 }
 
 /// Alone, and with neighbours that it has no lee of, it goes on to the same bits as without the law.
-static void a_lone_floe_goes_on_as_without(void **state)
+TEST(a_lone_floe_goes_on_as_without)
 {
-    (void)state;
     uint64_t hash[2];
     for (int with = 0; with < 2; with++) {
         bt_world *w = begin(0.5, 10);
@@ -207,9 +202,8 @@ static void a_lone_floe_goes_on_as_without(void **state)
 }
 
 /// Squares that lie flush around both periods have no edge in the stream: skin alone. Beside it the same floe alone.
-static void a_closed_pack_is_braked_by_its_skin(void **state)
+TEST(a_closed_pack_is_braked_by_its_skin)
 {
-    (void)state;
     enum { N = 12 };
     const double v = 0.3, dt = 1e-6;
     bt_world *w = begin(dt, 10);
@@ -290,9 +284,8 @@ static double plain_lee(const bt_world *w, bt_idx i)
     return 1 - sum / LINES;
 }
 
-static void nothing_but_the_poses_counts(void **state)
+TEST(nothing_but_the_poses_counts)
 {
-    (void)state;
     bt_exposure found[3][FLOES];
     for (int k = 0; k < 3; k++) { // step, cells, and a search before that has found other things
         bt_world *w = random_field(k == 0 ? 0.1 : 5, k == 2 ? 9 : 0);
@@ -312,9 +305,8 @@ static void nothing_but_the_poses_counts(void **state)
 }
 
 /// Without a flow there is nothing to find, and what was found last stays.
-static void no_flow_no_factor(void **state)
+TEST(no_flow_no_factor)
 {
-    (void)state;
     bt_world *w = begin(1, 10);
     add_square(w, 10, 1, 0, 0);
     const bt_gid rear = add_square(w, 10, 1, 10.2, 0);
@@ -329,17 +321,4 @@ static void no_flow_no_factor(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_edge_behind_another),
-        cmocka_unit_test(what_stands_ahead_counts),
-        cmocka_unit_test(a_raft_of_two_has_the_skin_of_what_it_covers),
-        cmocka_unit_test(a_pile_has_the_skin_of_what_it_covers),
-        cmocka_unit_test(a_lone_floe_goes_on_as_without),
-        cmocka_unit_test(a_closed_pack_is_braked_by_its_skin),
-        cmocka_unit_test(nothing_but_the_poses_counts),
-        cmocka_unit_test(no_flow_no_factor),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

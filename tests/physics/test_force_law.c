@@ -10,7 +10,6 @@
 #include "scene.h"
 #include "force/forces.h"
 
-#include <stdio.h>
 #include <unistd.h>
 
 #include "base/h5read.h"
@@ -111,9 +110,8 @@ static double width_of(const bt_world *w, bt_idx i) { return 2 * w->bodies.radiu
 
 // --- the table -------------------------------------------------------------------------------------------------------
 
-static void what_will_not_do_is_refused(void **state)
+TEST(what_will_not_do_is_refused)
 {
-    (void)state;
     static const bt_law_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}},
                               no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
@@ -177,9 +175,8 @@ static void read_basin(bt_case *c)
     if (bt_case_read(c, in_folder("case.yml"), NULL, 0, &err) != BT_OK) fail_msg("%s", err.text[0]);
 }
 
-static void its_keys_are_keys_of_the_case(void **state)
+TEST(its_keys_are_keys_of_the_case)
 {
-    (void)state;
     bt_case c;
     read_basin(&c);
     char *text = bt_case_resolved(&c);
@@ -235,9 +232,8 @@ static bt_world *tow_world(bt_tow_mode mode, double speed)
 }
 
 /// Led: the tow bears what the laws say at the prescribed velocity, wherever the body is, beyond the period, too.
-static void the_tow_bears_it_at_a_set_speed(void **state)
+TEST(the_tow_bears_it_at_a_set_speed)
 {
-    (void)state;
     const double v = 1.2;
     bt_world *w = tow_world(BT_TOW_SPEED, v);
     for (int s = 0; s < 300; s++) {
@@ -262,9 +258,8 @@ static void the_tow_bears_it_at_a_set_speed(void **state)
 
 /// On a line: in every step, M (U2 − U1) and I (ω2 − ω1) are the impulses of the laws, the line and the ice, to
 /// rounding.
-static void the_momentum_balance_closes_on_a_line(void **state)
+TEST(the_momentum_balance_closes_on_a_line)
 {
-    (void)state;
     bt_world *w = tow_world(BT_TOW_LINE, 1.2);
     double turned = 0, touched = 0, worked = 0;
     for (int s = 0; s < 300; s++) {
@@ -305,9 +300,8 @@ static void the_momentum_balance_closes_on_a_line(void **state)
 
 /// Forces are those of the middle of a step, so k t gives k t²/2m exactly; a damper gives a moment by itself:
 /// I (ω2 − ω1) = Δt g (Ω − ω2).
-static void thrust_of_the_middle_and_moment(void **state)
+TEST(thrust_of_the_middle_and_moment)
 {
-    (void)state;
     enum { STEPS = 30 };
     const double rate = 0.7, damping = 5, turn = 0.3;
     bt_params p = scene_params(0.2, 1);
@@ -329,9 +323,8 @@ static void thrust_of_the_middle_and_moment(void **state)
 // --- ice -------------------------------------------------------------------------------------------------------------
 
 /// Undisturbed ice of a window moves as a floe among it that nothing touches, and begins as free drift has it.
-static void undisturbed_ice_feels_it(void **state)
+TEST(undisturbed_ice_feels_it)
 {
-    (void)state;
     enum { FLOES = 3 };
     bt_params p = scene_params(0.5, 1);
     p.period_x = 100, p.water_u = 0.1, p.air_v = 4, p.coriolis = 1e-3;
@@ -365,9 +358,8 @@ static void undisturbed_ice_feels_it(void **state)
 }
 
 /// Forces that nothing balances, although they are small beside each of them: no drift is found.
-static void no_drift_where_nothing_balances(void **state)
+TEST(no_drift_where_nothing_balances)
 {
-    (void)state;
     for (int never = 0; never < 2; never++) {
         bt_params p = scene_params(1e-3, 1);
         p.coriolis = 1e-2, p.water_u = 1;
@@ -385,9 +377,8 @@ static void no_drift_where_nothing_balances(void **state)
 }
 
 /// A floe in water at rest: it rests without waves, and is moved by them, also in the step after they have risen.
-static void floes_rest_only_without_it(void **state)
+TEST(floes_rest_only_without_it)
 {
-    (void)state;
     for (int waves = 0; waves < 2; waves++) {
         bt_params p = scene_params(0.5, 1);
         bt_world *w = bt_world_create(&p);
@@ -462,9 +453,8 @@ static int64_t series_of(const char *name, const char *series, double *x)
 
 /// Series and summary have the law by its name; stopped and taken up again in the middle of an entry, the same to the
 /// bit.
-static void a_run_records_it_and_a_resumed_run_the_same(void **state)
+TEST(a_run_records_it_and_a_resumed_run_the_same)
 {
-    (void)state;
     run_basin("whole", 0);
     run_basin("pieces", 7);
     double whole[64], pieces[64], tow[64];
@@ -505,9 +495,8 @@ static int clean_up(void **state)
 }
 
 /// j − K (U, ω) with K = 0 is a force like any other. Red when it counts only where something is damped.
-static void what_is_linear_acts_without_damping(void **state)
+TEST(what_is_linear_acts_without_damping)
 {
-    (void)state;
     const double dt = 0.5, m = 4, inertia = 8;
     bt_linear l = {.jx = 3, .jy = -2, .jw = 5, .twist = 5};
     bt_vel u = {.x = 1, .y = 2, .w = 0.25};
@@ -515,19 +504,4 @@ static void what_is_linear_acts_without_damping(void **state)
     assert_true(u.x == 1 + dt * 3 / m && u.y == 2 - dt * 2 / m && u.w == 0.25 + dt * 5 / inertia);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_linear_acts_without_damping),
-        cmocka_unit_test(what_will_not_do_is_refused),
-        cmocka_unit_test(its_keys_are_keys_of_the_case),
-        cmocka_unit_test(the_tow_bears_it_at_a_set_speed),
-        cmocka_unit_test(the_momentum_balance_closes_on_a_line),
-        cmocka_unit_test(thrust_of_the_middle_and_moment),
-        cmocka_unit_test(undisturbed_ice_feels_it),
-        cmocka_unit_test(no_drift_where_nothing_balances),
-        cmocka_unit_test(floes_rest_only_without_it),
-        cmocka_unit_test(a_run_records_it_and_a_resumed_run_the_same),
-    };
-    return cmocka_run_group_tests(tests, set_up, clean_up);
-}
+TEST_MAIN(set_up, clean_up)

@@ -61,9 +61,8 @@ static int run(bt_world *w, int steps, bt_impact *out)
 
 /// Flush and central, heavy body: one collision with λ = (1+e) m V and m_e = m, whatever part of the gap its first step
 /// closes. Half-sine: mean λ/T_c, peak π/2 of it.
-static void central_impact(void **state)
+TEST(central_impact)
 {
-    (void)state;
     const double es[] = {0, 0.5}, gaps[] = {0, 0.013, 0.0299, 0.037};
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 4; k++) {
@@ -93,9 +92,8 @@ static void central_impact(void **state)
 
 /// A corner of a turned floe is hit: 1/m_e = 1/m + (r×n)²/I, λ = (1+e) V m_e; with a free body 1/M + (R×n)²/J comes on
 /// top, and friction, which here sticks, changes λ but not that all of it is collision.
-static void eccentric_impact(void **state)
+TEST(eccentric_impact)
 {
-    (void)state;
     const double es[] = {0, 0.5}, mus[] = {0, 2};
     for (int i = 0; i < 8; i++) {
         const double e = es[i & 1], mu = mus[i >> 1 & 1], yaw = 0.3;
@@ -133,9 +131,8 @@ static void eccentric_impact(void **state)
 /// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and
 /// in λ, but the collision has the momentum of the mass alone, and the rest is quasi-static. From then on the contact
 /// carries k V².
-static void drag_is_quasi_static(void **state)
+TEST(drag_is_quasi_static)
 {
-    (void)state;
     bt_params p = scene_params(0.5, 1);
     bt_world *w = bt_world_create(&p);
     double v[8];
@@ -159,9 +156,8 @@ static void drag_is_quasi_static(void **state)
 
 /// Flush, but only a part of the floe's side meets the hull: the body's corner, 0.2 m from the floe's middle, has all
 /// of it.
-static void hit_beside_the_middle(void **state)
+TEST(hit_beside_the_middle)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     add_square(w, 0.5, 5.2, 0, 0, 0);
@@ -177,9 +173,8 @@ static void hit_beside_the_middle(void **state)
 
 /// The body itself, free, runs into a wall with its front, or turned by a quarter with its side: it is now the first of
 /// the pair. λ = M V, and the force is against the motion.
-static void body_against_a_wall(void **state)
+TEST(body_against_a_wall)
 {
-    (void)state;
     for (int i = 0; i < 2; i++) {
         bt_params p = scene_params(0.1, 1);
         bt_world *w = bt_world_create(&p);
@@ -208,9 +203,8 @@ static void body_against_a_wall(void **state)
 
 /// A floe lies against a body at rest and the wind presses on it: a quasi-static load of that force, never a collision;
 /// no matter with how many of its parts it lies there.
-static void static_load(void **state)
+TEST(static_load)
 {
-    (void)state;
     for (int parts = 1; parts <= 2; parts++) {
         bt_params p = scene_params(0.1, 1);
         p.air_u = -20;
@@ -241,9 +235,8 @@ static void static_load(void **state)
 }
 
 /// A body that speeds up with a floe before it pushes; so does one that squeezes a floe against a wall.
-static void pushed_ahead(void **state)
+TEST(pushed_ahead)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     add_square(w, 0.5, 0, 0, 0, 0);
@@ -259,9 +252,8 @@ static void pushed_ahead(void **state)
 
 /// Two floes in a row, apart: the first is hit, then carries the body's push into the second; and a floe met later is
 /// an event of its own.
-static void events_in_their_order(void **state)
+TEST(events_in_their_order)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     add_square(w, 1.5, 3, 0, 0, 0);
@@ -281,9 +273,8 @@ static void events_in_their_order(void **state)
 
 /// The real corner: 90° of a square that hits with its corner, 60° of a triangle, and the body's own corner in a floe's
 /// edge.
-static void corner_in_contact(void **state)
+TEST(corner_in_contact)
 {
-    (void)state;
     for (int i = 0; i < 3; i++) {
         bt_params p = scene_params(0.001, 1);
         bt_world *w = bt_world_create(&p);
@@ -318,9 +309,8 @@ static void corner_in_contact(void **state)
 
 /// A heap of many floes before a turning, free body: at every sample the panels together carry the ice force, panels
 /// hold what touches there, and quasi-static load and collision make up the resistance.
-static void panels_carry_the_ice_force(void **state)
+TEST(panels_carry_the_ice_force)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     p.tolerance = 1e-6;
     bt_world *w = bt_world_create(&p);
@@ -366,9 +356,8 @@ static void panels_carry_the_ice_force(void **state)
 }
 
 /// Panels of a square of side 10 in 40 pieces of 1 m: panel 0 is centred on the x axis, then anticlockwise.
-static void panels_of_a_square(void **state)
+TEST(panels_of_a_square)
 {
-    (void)state;
     double v[8];
     scene_square(10, v);
     bt_panels p;
@@ -393,15 +382,4 @@ static void panels_of_a_square(void **state)
     bt_panels_free(&p);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(central_impact),        cmocka_unit_test(eccentric_impact),
-        cmocka_unit_test(drag_is_quasi_static),          cmocka_unit_test(static_load),
-        cmocka_unit_test(hit_beside_the_middle), cmocka_unit_test(body_against_a_wall),
-        cmocka_unit_test(pushed_ahead),          cmocka_unit_test(events_in_their_order),
-        cmocka_unit_test(corner_in_contact),     cmocka_unit_test(panels_carry_the_ice_force),
-        cmocka_unit_test(panels_of_a_square),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

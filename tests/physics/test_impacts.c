@@ -15,9 +15,8 @@ static bt_idx add_square(bt_world *w, double x, double y, double yaw, double vx,
 }
 
 /// Central impact of masses m1, m2: v1' = v − (1+e) m2/(m1+m2) v, v2' = (1+e) m1/(m1+m2) v.
-static void central_impact(void **state)
+TEST(central_impact)
 {
-    (void)state;
     const double es[] = {0, 0.3, 1}, ratios[] = {1, 7, 1e4};
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
@@ -41,9 +40,8 @@ static void central_impact(void **state)
 }
 
 /// A square slides into a wall at an angle, edge on (two points): normal stop, tangential loss μ v_n, unless it sticks.
-static void oblique_impact_with_friction(void **state)
+TEST(oblique_impact_with_friction)
 {
-    (void)state;
     const double mus[] = {0, 0.1, 0.3, 0.9};
     for (int i = 0; i < 4; i++) {
         bt_params p = scene_params(0.01, 1);
@@ -63,9 +61,8 @@ static void oblique_impact_with_friction(void **state)
 }
 
 /// A corner hits a wall off centre, frictionless: impulse λ = (1+e) v / (1/m + (r×n)²/I), spin r×n λ / I.
-static void eccentric_impact(void **state)
+TEST(eccentric_impact)
 {
-    (void)state;
     const double es[] = {0, 0.5};
     for (int i = 0; i < 2; i++) {
         bt_params p = scene_params(0.001, 1);
@@ -85,9 +82,8 @@ static void eccentric_impact(void **state)
 }
 
 /// Row of n equal touching floes hit by another, inelastic: all go on with v/(n+1).
-static void row_of_touching_floes(void **state)
+TEST(row_of_touching_floes)
 {
-    (void)state;
     const int ns[] = {1, 5, 30};
     for (int i = 0; i < 3; i++) {
         const int n = ns[i];
@@ -105,9 +101,8 @@ static void row_of_touching_floes(void **state)
 }
 
 /// Row of separate floes, e = 1: each passes its velocity on, the last leaves with v and all others rest.
-static void row_of_separate_floes(void **state)
+TEST(row_of_separate_floes)
 {
-    (void)state;
     bt_params p = scene_params(0.01, 1);
     bt_world *w = bt_world_create(&p);
     const int n = 6;
@@ -118,9 +113,8 @@ static void row_of_separate_floes(void **state)
 }
 
 /// Nothing tunnels: a floe that would cross a thin wall in one long step is stopped at it.
-static void no_tunnelling(void **state)
+TEST(no_tunnelling)
 {
-    (void)state;
     bt_params p = scene_params(5, 30);
     bt_world *w = bt_world_create(&p);
     double v[8];
@@ -139,9 +133,8 @@ static void no_tunnelling(void **state)
 }
 
 /// A heavy body (10⁴ times the floe) presses a row of floes against a wall: all stop, without overlap.
-static void heavy_body_squeezes_a_row(void **state)
+TEST(heavy_body_squeezes_a_row)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     p.tolerance = 1e-5;
     p.position_sweeps = 5000;
@@ -161,9 +154,8 @@ static void heavy_body_squeezes_a_row(void **state)
 }
 
 /// Overlap is removed by displacement alone: two overlapping floes at rest part and stay at rest.
-static void projection_adds_no_velocity(void **state)
+TEST(projection_adds_no_velocity)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     add_square(w, 0, 0, 0, 0, 0, 1, 0.3, 0);
@@ -181,9 +173,8 @@ static void projection_adds_no_velocity(void **state)
 
 /// Two squares that overlap are parted up to the slop, and no farther when another pair, far away, has turned into each
 /// other and needs the second projection.
-static void what_is_parted_stays_where_it_is(void **state)
+TEST(what_is_parted_stays_where_it_is)
 {
-    (void)state;
     bt_params p = scene_params(1, 1);
     p.slop = 1e-3;
     bt_world *w = bt_world_create(&p);
@@ -262,9 +253,8 @@ static double roll_along_a_hull(bool plain, int64_t *passes)
 
 /// Gaps are linear in the turns of a step: by one projection floes that turn end inside the hull. What a second one on
 /// the outlines leaves is a few slops, and it is no part of the loads.
-static void floes_that_roll_do_not_enter_a_hull(void **state)
+TEST(floes_that_roll_do_not_enter_a_hull)
 {
-    (void)state;
     int64_t never, passes;
     const double once = roll_along_a_hull(true, &never), twice = roll_along_a_hull(false, &passes);
     print_message("deepest overlap %.3f m by one projection, %.3f m with the second (%d steps looked again)\n", once,
@@ -275,9 +265,8 @@ static void floes_that_roll_do_not_enter_a_hull(void **state)
 
 /// A bar of 40 m turns by 2 mrad in the step, and a square slides outwards along its advancing side by 3 m. Where the
 /// square was nothing closes; 3 m farther the bar has come 6 mm higher. The turn alone would leave 0.04 mm.
-static void a_floe_that_slides_along_a_turning_bar_does_not_enter_it(void **state)
+TEST(a_floe_that_slides_along_a_turning_bar_does_not_enter_it)
 {
-    (void)state;
     bt_params p = scene_params(1, 1);
     p.slop = 5e-4;
     bt_world *w = bt_world_create(&p);
@@ -298,9 +287,8 @@ static void a_floe_that_slides_along_a_turning_bar_does_not_enter_it(void **stat
 
 /// Squares that hit each other with friction and rebound gain energy by Newton's law, and the restitution of their
 /// island is lowered. Another island, which touches no body of it but the same wall, keeps its own: −e v.
-static void a_rebound_is_lowered_in_its_island_alone(void **state)
+TEST(a_rebound_is_lowered_in_its_island_alone)
 {
-    (void)state;
     enum { SIDE = 4 };
     const double v = 0.7, e = 0.9;
     uint64_t rng = 5;
@@ -322,17 +310,4 @@ static void a_rebound_is_lowered_in_its_island_alone(void **state)
     assert_true(lowered > 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(central_impact),         cmocka_unit_test(oblique_impact_with_friction),
-        cmocka_unit_test(eccentric_impact),       cmocka_unit_test(row_of_touching_floes),
-        cmocka_unit_test(row_of_separate_floes),  cmocka_unit_test(no_tunnelling),
-        cmocka_unit_test(heavy_body_squeezes_a_row), cmocka_unit_test(projection_adds_no_velocity),
-        cmocka_unit_test(what_is_parted_stays_where_it_is),
-        cmocka_unit_test(floes_that_roll_do_not_enter_a_hull),
-        cmocka_unit_test(a_floe_that_slides_along_a_turning_bar_does_not_enter_it),
-        cmocka_unit_test(a_rebound_is_lowered_in_its_island_alone),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

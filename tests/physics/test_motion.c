@@ -12,9 +12,8 @@ static bt_idx add_disc(bt_world *w, double area, double sheet, bt_drag drag, dou
 }
 
 /// M du/dt = −k u|u| in still water: u = u0 / (1 + k u0 t / M); yaw alike with I and its own coefficient.
-static void quadratic_drag_decay(void **state)
+TEST(quadratic_drag_decay)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     const bt_drag drag = {.water_skin = 3, .yaw = 0.7};
@@ -29,9 +28,8 @@ static void quadratic_drag_decay(void **state)
 }
 
 /// Wind U_a over still water: k_w u² = k_a (U_a − u)², so u = U_a / (1 + √(k_w/k_a)), skin and form, any Δt.
-static void terminal_velocity(void **state)
+TEST(terminal_velocity)
 {
-    (void)state;
     const double steps[] = {0.1, 5, 500};
     for (int i = 0; i < 3; i++) {
         bt_params p = scene_params(steps[i], 1);
@@ -57,9 +55,8 @@ static void terminal_velocity(void **state)
 }
 
 /// A free body under Coriolis runs a circle of radius U/f in 2π/f: to the right in the north, left in the south.
-static void inertial_circle(void **state)
+TEST(inertial_circle)
 {
-    (void)state;
     const double f = 1.4e-4, u = 0.3, dt = 5;
     for (int sense = 1; sense >= -1; sense -= 2) {
         bt_params p = scene_params(dt, 30);
@@ -86,9 +83,8 @@ static void inertial_circle(void **state)
 }
 
 /// Sea-surface tilt: −g ∇η accelerates; with the current in geostrophic balance a body at the current's speed keeps it.
-static void tilt_and_geostrophic_balance(void **state)
+TEST(tilt_and_geostrophic_balance)
 {
-    (void)state;
     bt_params p = scene_params(1, 30);
     p.tilt_ax = -9.81e-5;
     bt_world *w = bt_world_create(&p);
@@ -132,9 +128,8 @@ static bt_world *line_world(double dt, double k, double c, double speed, bt_drag
 
 /// Carriage at constant speed V, no drag, taut from the start: u = V (1 − cos ωt), so the line goes slack first
 /// at ωt = π. Tension k V/ω sin ωt.
-static void spring_towed_mass(void **state)
+TEST(spring_towed_mass)
 {
-    (void)state;
     const double k = 4, v = 0.13, dt = 0.02;
     bt_world *w = line_world(dt, k, 0, v, (bt_drag){0});
     const double m = w->bodies.mass[bt_world_index(w, 0)], om = sqrt(k / m), peak = k * v / om;
@@ -159,9 +154,8 @@ static void spring_towed_mass(void **state)
 
 /// With drag the tow becomes steady: T = k_d V². Damped line, any stiffness: stable at Δt 0.1 s for EA over ten
 /// decades.
-static void line_is_stable_and_carries_the_drag(void **state)
+TEST(line_is_stable_and_carries_the_drag)
 {
-    (void)state;
     for (double k = 1e-1; k < 1e10; k *= 10) {
         const double v = 0.13, kd = 80;
         bt_world *w = line_world(0.1, k, 0.5 * sqrt(k * 100), v, (bt_drag){.water_skin = kd});
@@ -179,9 +173,8 @@ static void line_is_stable_and_carries_the_drag(void **state)
 }
 
 /// A line made fast off the axis turns the body until the fastening point leads.
-static void line_turns_the_body(void **state)
+TEST(line_turns_the_body)
 {
-    (void)state;
     bt_world *w = line_world(0.1, 50, 20, 0.13, (bt_drag){.water_skin = 80, .yaw = 20});
     w->tow->branch[0].hull_x = 0;
     w->tow->branch[0].hull_y = 0.6;
@@ -190,16 +183,4 @@ static void line_turns_the_body(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quadratic_drag_decay),
-        cmocka_unit_test(terminal_velocity),
-        cmocka_unit_test(inertial_circle),
-        cmocka_unit_test(tilt_and_geostrophic_balance),
-        cmocka_unit_test(spring_towed_mass),
-        cmocka_unit_test(line_is_stable_and_carries_the_drag),
-        cmocka_unit_test(line_turns_the_body),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

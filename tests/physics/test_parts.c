@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Floes that are not convex: contacts of their parts against distances of the outlines, bays, shores of several parts,
 // balances.
+#include "test.h"
 #include "all_pairs.h"
 
 #include "bergtow/outline.h"
@@ -132,9 +133,8 @@ static double least_gap(const bt_world *w, double margin, double *nx, double *ny
 /// Two outlines, one of them or both with bays, at a known distance: there is a contact within the margin, its gap is
 /// the distance, and none feigns less. A little into each other along their nearest points: the depth is found, and the
 /// way out is short.
-static void gaps_are_distances_of_outlines(void **state)
+TEST(gaps_are_distances_of_outlines)
 {
-    (void)state;
     uint64_t rng = 5;
     int near = 0, in = 0, lost = 0;
     for (int k = 0; k < 3000; k++) {
@@ -176,9 +176,8 @@ static void gaps_are_distances_of_outlines(void **state)
     if (lost > in / 100) fail_msg("%d of %d overlaps were not seen", lost, in);
 }
 
-static void detect_equals_brute_force_with_parts(void **state)
+TEST(detect_equals_brute_force_with_parts)
 {
-    (void)state;
     uint64_t rng = 9;
     int64_t total = 0, missing = 0;
     for (int scene = 0; scene < 4; scene++) {
@@ -256,9 +255,8 @@ static void detect_equals_brute_force_with_parts(void **state)
 
 /// A small floe enters the bay of a C that its hull would close, meets the inner shore after the way that is drawn, and
 /// both go on with the common momentum.
-static void a_bay_is_open(void **state)
+TEST(a_bay_is_open)
 {
-    (void)state;
     bt_params p = params_of_world(0.01);
     bt_world *w = bt_world_create(&p);
     double c[] = {0, 0, 2, 0, 2, 0.5, 0.5, 0.5, 0.5, 1.5, 2, 1.5, 2, 2, 0, 2}, s[8];
@@ -282,9 +280,8 @@ static void a_bay_is_open(void **state)
 }
 
 /// A floe pressed on a straight shore of two parts slides over the cut, both ways, as if it were not there.
-static void a_cut_does_not_stop_a_slide(void **state)
+TEST(a_cut_does_not_stop_a_slide)
 {
-    (void)state;
     for (int way = -1; way <= 1; way += 2) {
         bt_params p = params_of_world(0.01);
         p.tilt_ay = -0.1;
@@ -314,9 +311,8 @@ static void a_cut_does_not_stop_a_slide(void **state)
 
 /// A floe that is cut from corner to corner stands on that corner: both parts touch there, by one point each, and the
 /// two are one.
-static void a_corner_at_a_cut_is_one_point(void **state)
+TEST(a_corner_at_a_cut_is_one_point)
 {
-    (void)state;
     const bt_params p = params_of_world(0.01);
     for (int upper = 0; upper < 2; upper++) { // the floe comes before the shore, or after it
         bt_world *w = bt_world_create(&p);
@@ -347,9 +343,8 @@ static void a_corner_at_a_cut_is_one_point(void **state)
 /// A convex floe cut by hand collides like the whole one: off-centre, so that it turns, and with the cut where it is
 /// hit or elsewhere. Where two edges face each other squarely the parts may take the other one's normal, within the tie
 /// of the narrow phase; that is some per cent of the velocities, and happens in few of these.
-static void parts_collide_like_the_whole(void **state)
+TEST(parts_collide_like_the_whole)
 {
-    (void)state;
     int differ = 0;
     for (int cut = 0; cut < 3; cut++)
         for (int k = 0; k < 8; k++) {
@@ -387,9 +382,8 @@ static void parts_collide_like_the_whole(void **state)
 }
 
 /// Stars that collide in a heap: momentum and angular momentum stay, energy does not grow, overlap is small.
-static void heap_of_stars_keeps_its_balances(void **state)
+TEST(heap_of_stars_keeps_its_balances)
 {
-    (void)state;
     uint64_t rng = 21;
     bt_params p = params_of_world(0.02);
     p.position_sweeps = 0; // displacements would add to the angular momentum of what moves
@@ -427,9 +421,8 @@ static void heap_of_stars_keeps_its_balances(void **state)
 
 /// Stars pressed together by walls that close until they lock: every overlap that a look at the outlines finds stays
 /// small, and the program's own figure of it does not hide any.
-static void pressed_stars_do_not_pass_through_each_other(void **state)
+TEST(pressed_stars_do_not_pass_through_each_other)
 {
-    (void)state;
     uint64_t rng = 33;
     bt_params p = params_of_world(0.05);
     p.slop = 1e-3, p.max_sweeps = 2000, p.tolerance = 1e-5, p.position_sweeps = 300;
@@ -470,17 +463,4 @@ static void pressed_stars_do_not_pass_through_each_other(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gaps_are_distances_of_outlines),
-        cmocka_unit_test(detect_equals_brute_force_with_parts),
-        cmocka_unit_test(a_bay_is_open),
-        cmocka_unit_test(a_cut_does_not_stop_a_slide),
-        cmocka_unit_test(a_corner_at_a_cut_is_one_point),
-        cmocka_unit_test(parts_collide_like_the_whole),
-        cmocka_unit_test(heap_of_stars_keeps_its_balances),
-        cmocka_unit_test(pressed_stars_do_not_pass_through_each_other),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

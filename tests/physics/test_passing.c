@@ -81,9 +81,8 @@ static void carried(const bt_moving *m, double x, double y, double t, double *ou
 
 // Turns of up to a whole circle within the step. Red: no bend of the way (ω² terms), one body that does not turn, a
 // first step to the end of the time.
-static void the_sweep_sees_every_meeting(void **state)
+TEST(the_sweep_sees_every_meeting)
 {
-    (void)state;
     uint64_t rng = 3;
     const double near = 2e-3;
     int meet = 0, pass = 0, mistaken = 0;
@@ -142,9 +141,8 @@ static bt_world *random_pair(uint64_t *rng, bool turning)
 
 // Red: a review that releases nothing (some 300 of those that pass are stopped or turned); one that looks at the end of
 // the step alone, or does not turn the outlines.
-static void what_passes_keeps_its_velocity_and_what_meets_does_not(void **state)
+TEST(what_passes_keeps_its_velocity_and_what_meets_does_not)
 {
-    (void)state;
     uint64_t rng = 11;
     int passed = 0, close = 0, met = 0;
     for (int k = 0; k < 3000; k++) {
@@ -189,9 +187,8 @@ static bt_world *pushed_row(int n, double gap, double dt)
 
 // A pusher at 1 m/s goes V dt in the step, and the k-th floe is moved by what is left of that after k gaps: in the same
 // step, however long the row. Red: rows left out before the solve, of pairs that pass by their free velocities.
-static void a_push_runs_through_a_row_within_the_step(void **state)
+TEST(a_push_runs_through_a_row_within_the_step)
 {
-    (void)state;
     for (int n = 2; n <= 20; n++)
         for (double share = 0.1; share < 1.05; share += 0.3) {
             const double dt = 0.5, gap = share * dt;
@@ -238,9 +235,8 @@ static void without(const bt_world *w, const bt_contact *u, bt_vel v[2])
 }
 
 // Red: released pairs that do not come back; velocities of before the solve; a row that is judged with its own impulse.
-static void in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not(void **state)
+TEST(in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not)
 {
-    (void)state;
     uint64_t rng = 5;
     int loaded = 0, released = 0;
     for (int k = 0; k < 60; k++) {
@@ -278,13 +274,4 @@ static void in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not(void
     assert_true(loaded > 500 && released > 100);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_sweep_sees_every_meeting),
-        cmocka_unit_test(what_passes_keeps_its_velocity_and_what_meets_does_not),
-        cmocka_unit_test(a_push_runs_through_a_row_within_the_step),
-        cmocka_unit_test(in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

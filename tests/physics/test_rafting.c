@@ -85,9 +85,8 @@ static void check_step(const bt_world *w)
 /// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more
 /// than half under; another pushes it back, where friction alone resists; pushed again it meets the edge at the depth
 /// where it was. Walls without friction guide it, closer than a slop, or it would give way to a side.
-static void two_squares(void **state)
+TEST(two_squares)
 {
-    (void)state;
     const double a = 10, v = 0.05, dt = 0.1;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -153,9 +152,8 @@ static void two_squares(void **state)
 /// A corner meets an edge while the next one is far from it. A fast floe in the neighbourhood makes the search look
 /// farther ahead and find that corner, too, which must not change what the first one bears: the line load on a length
 /// of one thickness.
-static void the_margin_of_the_search(void **state)
+TEST(the_margin_of_the_search)
 {
-    (void)state;
     const double dt = 1e-4, yaw = 0.03, corner = 0.5 * (cos(yaw) + sin(yaw));
     for (int fast = 0; fast < 2; fast++) {
         bt_params p = params(dt);
@@ -176,9 +174,8 @@ static void the_margin_of_the_search(void **state)
 
 /// A floe at rest is pushed across a gap and shut against an edge by a plate: whether it lies true or is turned a
 /// little, it bears along its whole edge, and both ends alike.
-static void pushed_shut(void **state)
+TEST(pushed_shut)
 {
-    (void)state;
     const double a = 10, yaw[] = {0, 1e-12, -1e-12, 1e-4};
     for (int i = 0; i < 4; i++) {
         bt_params p = params(0.1);
@@ -205,9 +202,8 @@ static void pushed_shut(void **state)
 
 /// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they
 /// meet as at first.
-static void out_behind(void **state)
+TEST(out_behind)
 {
-    (void)state;
     const double a = 4, v = 0.1, dt = 0.1;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -239,9 +235,8 @@ static void out_behind(void **state)
 
 /// A row of equal floes between a plate and a wall gives way at its weakest contact, and the contacts take turns:
 /// shortened by s over m contacts F = q0 a + μ (ρ_w − ρ_i) g h a s/m.
-static void confined_row(void **state)
+TEST(confined_row)
 {
-    (void)state;
     enum { N = 5 };
     const double a = 8, v = 0.05, dt = 0.1;
     bt_params p = params(dt);
@@ -274,9 +269,8 @@ static void confined_row(void **state)
 
 /// A square that lies on another by a fifth turns by 0.1 rad and more in a step: its pose follows from its velocity
 /// alone, and what has slid over the other stays there.
-static void a_turn_takes_no_raft_back(void **state)
+TEST(a_turn_takes_no_raft_back)
 {
-    (void)state;
     const double a = 10, dt = 2;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -304,9 +298,8 @@ static void a_turn_takes_no_raft_back(void **state)
 /// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the
 /// thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that a hull drives into the pack: the hull itself
 /// does not raft, and its load is that of the edge behind.
-static void apex_under_an_edge(void **state)
+TEST(apex_under_an_edge)
 {
-    (void)state;
     const double v = 0.02, dt = 0.1, base = 6, height = 5, slope = 0.5 * base / height;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
@@ -336,9 +329,8 @@ static void apex_under_an_edge(void **state)
 
 /// A floe runs against one that is fixed, or free and ten times as thick: no sheet slides over them. Against one that
 /// is twice as thick it does.
-static void structures_do_not_raft(void **state)
+TEST(structures_do_not_raft)
 {
-    (void)state;
     const double a = 10, thickness[] = {h, 10 * h, 2 * h};
     for (int i = 0; i < 3; i++) {
         bt_params p = params(0.1);
@@ -358,9 +350,8 @@ static void structures_do_not_raft(void **state)
 /// A plough as wide as its channel, closed at the end, pushes floes in two lanes, half a floe apart. What it needs for
 /// a metre of advance is what goes under on it: the work of the plough is that of edges and sheets, edges take q0 for
 /// the area that went under, and as the channel grows shorter by s its width times s lies twice.
-static void plough_in_a_channel(void **state)
+TEST(plough_in_a_channel)
 {
-    (void)state;
     enum { LANE = 5 };
     const double a = 6, v = 0.05, dt = 0.1, width = 2 * a;
     bt_params p = params(dt);
@@ -394,9 +385,8 @@ static void plough_in_a_channel(void **state)
 
 /// Random floes driven at each other with spin and friction: momentum to round-off, no work gained, and what the
 /// contacts take is what the kinetic energy loses.
-static void energy_is_booked(void **state)
+TEST(energy_is_booked)
 {
-    (void)state;
     uint64_t rng = 11;
     int rafted = 0;
     for (int c = 0; c < 20; c++) {
@@ -432,9 +422,8 @@ static void energy_is_booked(void **state)
 
 /// A floe comes to rest on another: friction that is carried over from step to step pushes it to and fro below the
 /// tolerance, where there is next to no kinetic energy left. That is no energy added by the contacts.
-static void residual_adds_no_energy(void **state)
+TEST(residual_adds_no_energy)
 {
-    (void)state;
     bt_params p = params(0.5);
     p.tolerance = 1e-2;
     bt_world *w = bt_world_create(&p);
@@ -454,9 +443,8 @@ static void residual_adds_no_energy(void **state)
 
 /// Rectangles in a row whose long sides lie on each other to rounding: those sides push neither way, the ends do, by
 /// the width of the row. Where they have passed each other by half of the blend, half of their length pushes.
-static void sides_that_lie_on_each_other_do_not_push(void **state)
+TEST(sides_that_lie_on_each_other_do_not_push)
 {
-    (void)state;
     const double length = 10, overlap = 4, blend = 0.01;
     for (int side = -1; side <= 1; side += 2)
         for (int half = 0; half < 2; half++) {
@@ -480,9 +468,8 @@ static void sides_that_lie_on_each_other_do_not_push(void **state)
 /// lies on each other, with the friction of the sheets, until one of them is under by a fifteenth of its side.
 /// Without friction the row drifts on to a side, by 0.5 m at most in the minute that this takes. Without the ends of
 /// the overlap it slipped out: no load at no friction.
-static void a_row_out_of_line(void **state)
+TEST(a_row_out_of_line)
 {
-    (void)state;
     enum { N = 5 };
     const double a = 8, v = 0.02;
     for (int i = 0; i < 8; i++) {
@@ -524,9 +511,8 @@ static void a_row_out_of_line(void **state)
 /// What it costs to cover an area, without friction: q0 where the area of the overlap grows, whatever the angle to the
 /// edge, and q0 times half the width that is under for each length along the edge. The way back costs nothing. The floe
 /// is so heavy that nothing stops it.
-static void the_cost_of_an_angle(void **state)
+TEST(the_cost_of_an_angle)
 {
-    (void)state;
     const double a = 10, v = 0.05, angle[] = {0, 15, 30, 45, 90, 120, 180};
     for (int i = 0; i < 7; i++) {
         bt_params p = params(0.1);
@@ -560,9 +546,8 @@ static void the_cost_of_an_angle(void **state)
 
 /// A heavy floe slides back by 0.2 m, and comes on: in a step that leaves it short of where it was the edge bears
 /// nothing; in one of 0.5 m the losses are those of 0.3 m, within a slop.
-static void a_gap_is_crossed_in_a_step(void **state)
+TEST(a_gap_is_crossed_in_a_step)
 {
-    (void)state;
     const double a = 10, stored = rise() * h * h, on[] = {0.1, 0.5};
     for (int i = 0; i < 2; i++) {
         bt_params p = params(1);
@@ -589,9 +574,8 @@ static void a_gap_is_crossed_in_a_step(void **state)
 
 /// In line what a plate does is what is stored, in rafted_energy, and what is lost, to the last digits; a wedge, whose
 /// chord grows within a step, is off by an amount that halves with the step.
-static void stored_and_lost_is_work(void **state)
+TEST(stored_and_lost_is_work)
 {
-    (void)state;
     const double a = 10, v = 0.02, base = 6, height = 5;
     double off[2];
     for (int i = 0; i < 3; i++) {
@@ -629,9 +613,8 @@ static void stored_and_lost_is_work(void **state)
 
 /// Floes driven together, in two worlds that are the same; then one step of them, in one from the impulses of the step
 /// before, in the other from none. The velocities are the same: the law of what has rafted is associated.
-static void cold_and_warm(void **state)
+TEST(cold_and_warm)
 {
-    (void)state;
     double worst = 0;
     int rafted = 0;
     for (int seed = 1; seed <= 10; seed++) {
@@ -670,26 +653,4 @@ static void cold_and_warm(void **state)
     assert_true(rafted > 50 && worst < 1e-8);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_squares),
-        cmocka_unit_test(sides_that_lie_on_each_other_do_not_push),
-        cmocka_unit_test(the_margin_of_the_search),
-        cmocka_unit_test(pushed_shut),
-        cmocka_unit_test(out_behind),
-        cmocka_unit_test(confined_row),
-        cmocka_unit_test(a_turn_takes_no_raft_back),
-        cmocka_unit_test(apex_under_an_edge),
-        cmocka_unit_test(structures_do_not_raft),
-        cmocka_unit_test(plough_in_a_channel),
-        cmocka_unit_test(a_row_out_of_line),
-        cmocka_unit_test(the_cost_of_an_angle),
-        cmocka_unit_test(a_gap_is_crossed_in_a_step),
-        cmocka_unit_test(stored_and_lost_is_work),
-        cmocka_unit_test(cold_and_warm),
-        cmocka_unit_test(energy_is_booked),
-        cmocka_unit_test(residual_adds_no_energy),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -27,9 +27,8 @@ static void add_floe(bt_world *w, double r, double x, double y, double yaw, doub
 
 /// Disc of radius R at speed V, floes of radius r at rest, each met alone: one hit gives m(1+e)V cosθ along the normal,
 /// (R+r) sinθ = y, so over all y  F = (4/3)(1+e) A ρ_i h (R+r) V². Here A ρ_i h V · 1 s of lane per stratum of y.
-static void dilute_floes_one_by_one(void **state)
+TEST(dilute_floes_one_by_one)
 {
-    (void)state;
     const double big = 5, r = 0.5, v = 0.13, es[] = {0, 0.5, 1};
     for (int i = 0; i < 3; i++) {
         const int strata = 500;
@@ -59,9 +58,8 @@ static void dilute_floes_one_by_one(void **state)
 }
 
 /// The same limit in one field: random floes at 1 % in a lane, inelastic. The concentration is that of the lane.
-static void dilute_field(void **state)
+TEST(dilute_field)
 {
-    (void)state;
     const double big = 5, r = 0.5, v = 0.5, a = 0.01;
     const int n = 233; // a Fibonacci number: with the golden ratio below, the evenest sequence of that length
     const double lane = 2 * (big + r + 2), length = n * BT_PI * r * r / (a * lane);
@@ -95,9 +93,8 @@ static void dilute_field(void **state)
 
 /// A piston sweeps frictionless inelastic floes of concentration A together to φ: front V φ/(φ−A), force
 /// ρ_i h W V² A φ/(φ−A). φ is measured behind the front.
-static void plough_in_a_channel(void **state)
+TEST(plough_in_a_channel)
 {
-    (void)state;
     const double width = 6, length = 200, r = 0.5, v = 0.5, area = BT_PI * r * r;
     const double targets[] = {0.2, 0.35};
     for (int i = 0; i < 2; i++) {
@@ -168,12 +165,4 @@ static void plough_in_a_channel(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dilute_floes_one_by_one),
-        cmocka_unit_test(dilute_field),
-        cmocka_unit_test(plough_in_a_channel),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

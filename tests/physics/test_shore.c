@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Fixed bodies against each other: contacts of a convex outline that is cut into pieces against that outline, and the
 // search for polygons against all pairs.
+#include "test.h"
 #include "all_pairs.h"
 
 #include "geometry/polygons.h"
@@ -64,9 +65,8 @@ static double distance_to_edges(int n, const double *v, int m, const double *o)
 /// A floe beside an outline in pieces has a contact exactly if it is near the outline, its least gap is the distance,
 /// and each contact pushes along a normal that the outline itself has there: to the side of a plane that holds all of
 /// it.
-static void pieces_touch_as_their_outline_does(void **state)
+TEST(pieces_touch_as_their_outline_does)
 {
-    (void)state;
     uint64_t rng = 5;
     const double margin = bt_margin_for(&(bt_world){.par = {.dt = 0.1, .slop = SLOP, .size = 1}}, 1);
     int seen = 0, deep = 0;
@@ -137,9 +137,8 @@ static void pieces_touch_as_their_outline_does(void **state)
 
 /// Blocks of different depth with their fronts in one line: above it a floe is pushed straight away from it, although
 /// the sides of the deeper ones show at their backs.
-static void sides_that_show_at_the_back_do_not_stop_a_slide(void **state)
+TEST(sides_that_show_at_the_back_do_not_stop_a_slide)
 {
-    (void)state;
     uint64_t rng = 3;
     const double margin = 0.5;
     int seen = 0;
@@ -175,9 +174,8 @@ static void sides_that_show_at_the_back_do_not_stop_a_slide(void **state)
 }
 
 /// The tree finds the polygons of a shore as a look at all pairs does, also across periods.
-static void detection_on_a_shore_equals_brute_force(void **state)
+TEST(detection_on_a_shore_equals_brute_force)
 {
-    (void)state;
     uint64_t rng = 9;
     bt_idx total = 0;
     for (int scene = 0; scene < 8; scene++) {
@@ -219,12 +217,4 @@ static void detection_on_a_shore_equals_brute_force(void **state)
     assert_true(total > 500);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pieces_touch_as_their_outline_does),
-        cmocka_unit_test(sides_that_show_at_the_back_do_not_stop_a_slide),
-        cmocka_unit_test(detection_on_a_shore_equals_brute_force),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -48,9 +48,8 @@ static bt_world *vessel_world(double dt, double sheet, double vessel_mass, doubl
 /// Two masses on a line stretched by s0 and let go oscillate with the reduced mass μ = m M/(m + M):
 /// stretch s0 e^(−ct/2μ) (cos ωt + (c/2μω) sin ωt), ω² = k/μ − (c/2μ)², until the line goes slack; their centre of mass
 /// stays.
-static void free_vessel_and_body_swing_with_the_reduced_mass(void **state)
+TEST(free_vessel_and_body_swing_with_the_reduced_mass)
 {
-    (void)state;
     const double ratios[] = {0.02, 1, 50}, dampings[] = {0, 0.3};
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 2; j++) {
@@ -78,9 +77,8 @@ static void free_vessel_and_body_swing_with_the_reduced_mass(void **state)
 
 /// Period by zero crossings of the swing about a mean tension: body and vessel pulled apart by drag-free constant
 /// thrust would drift, so the end stands and the wind pulls; ω² = k/m, decrement e^(−cT/2m).
-static void body_in_the_wind_swings_on_a_fixed_end(void **state)
+TEST(body_in_the_wind_swings_on_a_fixed_end)
 {
-    (void)state;
     const double dt = 0.01, k = 40, c = 8;
     bt_world *w = tow_world(dt, 50, (bt_drag){0});
     w->par.tilt_ax = -0.05; // a steady force m × 0.05 against the line
@@ -108,9 +106,8 @@ static void body_in_the_wind_swings_on_a_fixed_end(void **state)
 
 /// A slack line does not damp: a heavily damped one pays out its metre of slack without a force, and pulls from then
 /// on.
-static void a_slack_line_is_no_damper(void **state)
+TEST(a_slack_line_is_no_damper)
 {
-    (void)state;
     bt_world *w = tow_world(0.1, 50, (bt_drag){.water_skin = 80});
     bt_tow *t = w->tow;
     t->mode = BT_TOW_LINE;
@@ -128,9 +125,8 @@ static void a_slack_line_is_no_damper(void **state)
 
 /// What a solution begins from: the impulse of the last step in a branch that is taut, none in a slack one, none at all
 /// where there is no last step.
-static void a_slack_branch_begins_from_nothing(void **state)
+TEST(a_slack_branch_begins_from_nothing)
 {
-    (void)state;
     for (int keep = 0; keep < 2; keep++) {
         bt_tow t = {.n_branches = 2, .branch = {{.taut = true, .lambda = 3}, {.taut = false, .lambda = 4}}};
         bt_tow_warm_start(&t, keep);
@@ -140,9 +136,8 @@ static void a_slack_branch_begins_from_nothing(void **state)
 
 /// A stretched line that slackens within the step damps as long as it is stretched:
 /// T Δt = Δt (k s − c v) / (1 + Δt c/m).
-static void a_stretched_line_damps_while_it_slackens(void **state)
+TEST(a_stretched_line_damps_while_it_slackens)
 {
-    (void)state;
     const double dt = 0.1, k = 40, c = 1, stretch = 0.01, v = 0.3;
     bt_world *w = tow_world(dt, 50, (bt_drag){0});
     bt_tow *t = w->tow;
@@ -158,9 +153,8 @@ static void a_stretched_line_damps_while_it_slackens(void **state)
 }
 
 /// A vessel without thrust on a slack line goes with the current, along its course and across.
-static void a_vessel_drifts_with_the_current(void **state)
+TEST(a_vessel_drifts_with_the_current)
 {
-    (void)state;
     bt_world *w = vessel_world(0.1, 50, 1000, 1, 0, -20);
     bt_tow *t = w->tow;
     t->vessel.bollard_pull = 500;
@@ -174,9 +168,8 @@ static void a_vessel_drifts_with_the_current(void **state)
 
 /// Bridle: two branches at ±0.6 m. Their stiffnesses add along the tow; a body that is turned is turned back. Against
 /// drag k_d V² each carries half, more by the angle between them.
-static void bridle_shares_the_load(void **state)
+TEST(bridle_shares_the_load)
 {
-    (void)state;
     bt_world *w = tow_world(0.1, 50, (bt_drag){.water_skin = 80, .yaw = 60});
     bt_tow *t = w->tow;
     const double v = 0.5, l = 5;
@@ -202,9 +195,8 @@ static void bridle_shares_the_load(void **state)
 
 /// T below and above the breaking load by a thousandth. The load grows slowly: the tension of a ramp a of the end is,
 /// for a fixed body, k a t²/2.
-static void a_branch_breaks_at_its_load(void **state)
+TEST(a_branch_breaks_at_its_load)
 {
-    (void)state;
     for (int above = 0; above < 2; above++) {
         const double drag = 80, v = 0.5, load = drag * v * v;
         bt_world *w = tow_world(0.1, 50, (bt_drag){.water_skin = drag});
@@ -243,9 +235,8 @@ static void a_branch_breaks_at_its_load(void **state)
 }
 
 /// Of two branches the shorter breaks first; the other carries all and holds.
-static void the_other_branch_takes_over(void **state)
+TEST(the_other_branch_takes_over)
 {
-    (void)state;
     bt_world *w = tow_world(0.1, 50, (bt_drag){.water_skin = 80, .yaw = 60});
     bt_tow *t = w->tow;
     t->mode = BT_TOW_LINE;
@@ -286,9 +277,8 @@ static double vessel_closure(const bt_tow *t)
 /// Full power: T_b (1 − (v/s_f)²) = k_d v². Governed: v of the programme, thrust R_f (v/s_f)² + k_d v². In a current U
 /// along the course both drags are by the speed through the water, the governor by that over ground. Any step up to 5
 /// s, any line, a vessel a hundredth of the body or heavier.
-static void vessel_bollard_equilibrium(void **state)
+TEST(vessel_bollard_equilibrium)
 {
-    (void)state;
     const double steps[] = {0.1, 5}, stiff[] = {10, 1e4, 1e9}, mass[] = {1, 100, 3000}, current[] = {0, 0.3};
     const double kd = 80, tb = 400, sf = 6, rf = 150;
     for (int a = 0; a < 2; a++)
@@ -351,9 +341,8 @@ static double energy(const bt_world *w)
 /// A stretched bridle between free body and vessel, no damping, no drag, Δt 5 s, stiffness over eleven decades and
 /// unequal by ten: the energy never grows beyond what the line held (twice that while the swing is resolved coarsely, h
 /// < 2).
-static void a_bridle_is_stable_at_any_stiffness(void **state)
+TEST(a_bridle_is_stable_at_any_stiffness)
 {
-    (void)state;
     for (double k = 1e-3; k < 1e9; k *= 10)
         for (int light = 0; light < 2; light++) {
             bt_world *w = vessel_world(5, 50, light ? 1 : 100, k, 0, 0.05);
@@ -374,9 +363,8 @@ static void a_bridle_is_stable_at_any_stiffness(void **state)
 }
 
 /// No astern: a vessel that runs out its way against its own drag alone, 1/v = 1/v0 + k t/M.
-static void a_stopped_programme_leaves_the_vessel_to_its_drag(void **state)
+TEST(a_stopped_programme_leaves_the_vessel_to_its_drag)
 {
-    (void)state;
     bt_world *w = vessel_world(1, 50, 1000, 1, 0, -20); // 20 m of slack
     bt_tow *t = w->tow;
     t->vessel.vx = 2;
@@ -390,9 +378,8 @@ static void a_stopped_programme_leaves_the_vessel_to_its_drag(void **state)
 
 /// A heavy body pushed into a row of light floes against a wall, on a bridle of a light vessel: contact forces, line
 /// and thrust in one system, solved to the tolerance, and in the end at rest, with thrust = tension = push on the wall.
-static void rows_and_contacts_are_one_system(void **state)
+TEST(rows_and_contacts_are_one_system)
 {
-    (void)state;
     const double stiff[] = {1e2, 1e8};
     for (int i = 0; i < 2; i++) {
         bt_params p = scene_params(5, 1);
@@ -441,9 +428,8 @@ static void rows_and_contacts_are_one_system(void **state)
 
 /// The end of a line, and in mode speed the body, are on the path to rounding at every step, and have gone the integral
 /// of the programme.
-static void the_end_follows_the_path_exactly(void **state)
+TEST(the_end_follows_the_path_exactly)
 {
-    (void)state;
     const double points[] = {60, 0, 90, 30, 90, 80};
     const bt_tow_mode modes[] = {BT_TOW_LINE, BT_TOW_SPEED};
     for (int i = 0; i < 2; i++)
@@ -506,9 +492,8 @@ static bt_world *piloted_world(void)
 }
 
 /// A vessel with a current abeam keeps its track: no cross-track error is left but what the current's drag makes.
-static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
+TEST(a_vessel_keeps_its_track_and_passes_the_waypoints)
 {
-    (void)state;
     bt_world *w = piloted_world();
     bt_tow *t = w->tow;
     char why[200];
@@ -530,9 +515,8 @@ static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
 
 /// Way-points whose course changes by more than 90°, sharp or round: on the leg before, the point ahead can lie abeam
 /// of the vessel, which once hung there for ever.
-static void a_vessel_turns_back(void **state)
+TEST(a_vessel_turns_back)
 {
-    (void)state;
     const struct { double degrees, radius;
     } corner[] = {{97, 0}, {120, 0}, {120, 5}, {150, 2}, {179, 0}};
     for (size_t k = 0; k < sizeof corner / sizeof *corner; k++) {
@@ -550,25 +534,4 @@ static void a_vessel_turns_back(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(free_vessel_and_body_swing_with_the_reduced_mass),
-        cmocka_unit_test(body_in_the_wind_swings_on_a_fixed_end),
-        cmocka_unit_test(a_slack_line_is_no_damper),
-        cmocka_unit_test(a_slack_branch_begins_from_nothing),
-        cmocka_unit_test(a_stretched_line_damps_while_it_slackens),
-        cmocka_unit_test(a_vessel_drifts_with_the_current),
-        cmocka_unit_test(bridle_shares_the_load),
-        cmocka_unit_test(a_branch_breaks_at_its_load),
-        cmocka_unit_test(the_other_branch_takes_over),
-        cmocka_unit_test(vessel_bollard_equilibrium),
-        cmocka_unit_test(a_bridle_is_stable_at_any_stiffness),
-        cmocka_unit_test(a_stopped_programme_leaves_the_vessel_to_its_drag),
-        cmocka_unit_test(rows_and_contacts_are_one_system),
-        cmocka_unit_test(the_end_follows_the_path_exactly),
-        cmocka_unit_test(a_vessel_keeps_its_track_and_passes_the_waypoints),
-        cmocka_unit_test(a_vessel_turns_back),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -35,9 +35,8 @@ static void add_body(bt_world *w, int n, double *v, double x, double speed)
 ///     flanks and shoulders give
 ///     F = A ρ_i h V² 2 [(B/2 + r c − y0) sin²α + r (2/3 − c + c³/3)].
 /// A wedge, and nothing before its tip: what is hit head on stays ahead for ever where there is no drag.
-static void wedge_in_dilute_ice(void **state)
+TEST(wedge_in_dilute_ice)
 {
-    (void)state;
     const double beam = 10, r = 0.4, speed = 0.5, a = 0.003, alpha = 30 * BT_PI / 180, c = cos(alpha);
     const double y0 = 1, half = 0.5 * beam + r + 1.5; // ice at y0 <= |y| <= half
     const int n = 200;
@@ -96,9 +95,8 @@ static void wedge_in_dilute_ice(void **state)
 /// A wedge in loose ice with drag: in a window of one field, and through that field six times over. A slender bow,
 /// strong drag and no friction keep rounding from growing as it does in dense ice, where single hits soon differ and
 /// only means can be compared (tests/long).
-static void as_in_one_long_domain(void **state)
+TEST(as_in_one_long_domain)
 {
-    (void)state;
     const double r = 0.5, speed = 0.4, length = 60, width = 12, ahead = 30, big = 1.5, laps = 2.5;
     enum { MOST = 400, COPIES = 6 };
     double xy[MOST][2], yaw[MOST];
@@ -149,11 +147,4 @@ static void as_in_one_long_domain(void **state)
     bt_world_free(w[1]);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wedge_in_dilute_ice),
-        cmocka_unit_test(as_in_one_long_domain),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

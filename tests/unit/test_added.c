@@ -5,7 +5,6 @@
 // of the key before; the unit of an added key ignored.
 #include "scene.h"
 
-#include <stdio.h>
 #include <unistd.h>
 
 #include "bergtow/case.h"
@@ -28,9 +27,8 @@ static bt_status read_text(bt_case *c, const char *text, bt_errors *err)
     return status;
 }
 
-static void a_shape_is_a_waterline(void **state)
+TEST(a_shape_is_a_waterline)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c, "body: {shape: capsule, length: 6, width: 2, x: 10, yaw: 30 deg}\n", &err) != BT_OK)
@@ -50,9 +48,8 @@ static void a_shape_is_a_waterline(void **state)
     bt_case_free(&c);
 }
 
-static void unknown_shapes_are_reported(void **state)
+TEST(unknown_shapes_are_reported)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     assert_int_equal(read_text(&c, "body: {shape: capsul, length: 6}\n", &err), BT_ERR_CASE);
@@ -67,9 +64,8 @@ static int line(double l, double w, double *v)
     return 2;
 }
 
-static void what_will_not_do_is_refused(void **state)
+TEST(what_will_not_do_is_refused)
 {
-    (void)state;
     const struct { const char *name; bt_shape_outline outline; const char *says; } bad[] = {
         {"ship", capsule, "a shape of this name"}, {"capsule", capsule, "a shape of this name"},
         {"none", capsule, "a shape of this name"}, {"Big barge", capsule, "lower-case letters"},
@@ -83,9 +79,8 @@ static void what_will_not_do_is_refused(void **state)
     }
 }
 
-static void a_key_is_a_key_of_the_case(void **state)
+TEST(a_key_is_a_key_of_the_case)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c, "body: {draft: 30 m, length: 2, x: 10}\npilot: {depth: 0.04 km}\n", &err) != BT_OK)
@@ -105,9 +100,8 @@ static void a_key_is_a_key_of_the_case(void **state)
 }
 
 /// What could not be read back from the resolved case is refused, and with it all keys of the call.
-static void keys_that_cannot_be_read_back_are_refused(void **state)
+TEST(keys_that_cannot_be_read_back_are_refused)
 {
-    (void)state;
     const struct { const char *section, *name, *doc, *says; } bad[] = {
         {"base", "x", "a key of the file", "no section is base"},
         {"floes", "x", "a key of the list", "no section is base or floes"},
@@ -135,12 +129,5 @@ int main(void)
     bt_errors err = {0};
     if (bt_shape_register("capsule", capsule, &err) != BT_OK || !bt_keys_add("pilot", pilot_keys, N_PILOT_KEYS, &err))
         bt_errors_print(&err);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_shape_is_a_waterline),
-        cmocka_unit_test(unknown_shapes_are_reported),
-        cmocka_unit_test(what_will_not_do_is_refused),
-        cmocka_unit_test(a_key_is_a_key_of_the_case),
-        cmocka_unit_test(keys_that_cannot_be_read_back_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: MIT
 // When the width of the domain belongs to the answer.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
+#include "test.h"
 #include "case/arch.h"
 
 /// A body of 4 × 2 m that is towed along x, in a domain of 40 m.
@@ -24,9 +16,8 @@ static bt_case narrow(void)
     return d;
 }
 
-static void the_width_counts_in_bodies_and_floes(void **state)
+TEST(the_width_counts_in_bodies_and_floes)
 {
-    (void)state;
     bt_case c = narrow();
     bt_arch a = bt_arch_of(&c, 0.8, 0.5);
     assert_true(fabs(a.bodies - 20) < 1e-12 && fabs(a.floes - 80) < 1e-12);
@@ -39,9 +30,8 @@ static void the_width_counts_in_bodies_and_floes(void **state)
 
 /// What stands beside a tow along y is at the ends of the domain; on an oblique course, and of way-points, it is the
 /// narrower pair.
-static void the_extent_across_the_tow_counts(void **state)
+TEST(the_extent_across_the_tow_counts)
 {
-    (void)state;
     bt_case c = narrow();
     c.domain.length = 10;
     c.domain.ends = BT_BOUND_PERIODIC;
@@ -76,9 +66,8 @@ static void the_extent_across_the_tow_counts(void **state)
 }
 
 /// The disc of moved ice grows with the way: π (w/2)² δ = way/width, both in body widths.
-static void a_long_tow_needs_more_width(void **state)
+TEST(a_long_tow_needs_more_width)
 {
-    (void)state;
     bt_case c = narrow();
     c.tow.mode = BT_TOW_SPEED, c.tow.speed = 1, c.tow.ramp = 20;
     c.run.duration = 40; // 30 m
@@ -95,9 +84,8 @@ static void a_long_tow_needs_more_width(void **state)
     assert_true(bt_arch_of(&c, 0.9, 0.5).needed == 60);
 }
 
-static void dense_ice_between_near_sides_can_arch(void **state)
+TEST(dense_ice_between_near_sides_can_arch)
 {
-    (void)state;
     bt_case c = narrow();
     assert_true(bt_arch_of(&c, 0.7, 0.5).possible);
     assert_false(bt_arch_of(&c, 0.69, 0.5).possible);
@@ -130,9 +118,8 @@ static void dense_ice_between_near_sides_can_arch(void **state)
 }
 
 /// Ice that ends beside the tow is told, from two floe sizes of water on.
-static void water_beside_the_ice_is_told(void **state)
+TEST(water_beside_the_ice_is_told)
 {
-    (void)state;
     bt_case c = narrow();
     c.domain.length = 200;
     c.ice.x_min = 50, c.ice.x_max = 60; // ahead and astern there may be any
@@ -160,14 +147,4 @@ static void water_beside_the_ice_is_told(void **state)
     assert_true(bt_arch_of(&c, 0.3, 0.5).water == 0 && bt_arch_of(&c, 0.3, 0.5).gap == 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_width_counts_in_bodies_and_floes),
-        cmocka_unit_test(the_extent_across_the_tow_counts),
-        cmocka_unit_test(a_long_tow_needs_more_width),
-        cmocka_unit_test(dense_ice_between_near_sides_can_arch),
-        cmocka_unit_test(water_beside_the_ice_is_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sweeps in batches, and residual passes four at a time, against the scalar update, contact by contact in the same
 // order: equal bit for bit; and what may stand together in a batch.
-#include <stdlib.h>
-#include <string.h>
-
 #include "scene.h"
 
 #include "solve/batch_layout.h"
@@ -188,9 +185,8 @@ static void check_residual(knot_of_floes *four, knot_of_floes *one)
     four->cell.work.n_list = n_list;
 }
 
-static void batches_do_what_single_updates_do(void **state)
+TEST(batches_do_what_single_updates_do)
 {
-    (void)state;
     static knot_of_floes four, one;
     bt_idx order[CONTACTS];
     uint64_t rng = 5;
@@ -298,9 +294,8 @@ static void check_projection_residual(knot_of_floes *four, knot_of_floes *one, d
     four->cell.work.n_list = n_list;
 }
 
-static void batches_project_as_single_updates_do(void **state)
+TEST(batches_project_as_single_updates_do)
 {
-    (void)state;
     static knot_of_floes four, one;
     bt_idx order[CONTACTS];
     uint64_t rng = 11;
@@ -341,9 +336,8 @@ static void batches_project_as_single_updates_do(void **state)
 }
 
 /// Every listed contact is swept once, and not much is left empty where there is a choice.
-static void each_listed_contact_is_in_one_batch(void **state)
+TEST(each_listed_contact_is_in_one_batch)
 {
-    (void)state;
     static knot_of_floes s;
     uint64_t rng = 8;
     fill(&s, &rng, 1);
@@ -366,12 +360,4 @@ static void each_listed_contact_is_in_one_batch(void **state)
     free(s.cell.contacts);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(batches_do_what_single_updates_do),
-        cmocka_unit_test(batches_project_as_single_updates_do),
-        cmocka_unit_test(each_listed_contact_is_in_one_batch),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

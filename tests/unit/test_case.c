@@ -6,13 +6,11 @@
 #include "case/schema.h"
 #include "case_text.h"
 
-#include <math.h>
 
 // ---- the table ----
 
-static void every_preset_and_range_is_well_formed(void **state)
+TEST(every_preset_and_range_is_well_formed)
 {
-    (void)state;
     const struct { const bt_key *keys; int n; size_t size; } tables[] = {
         {bt_case_keys, bt_n_case_keys, sizeof(bt_case)}, {bt_floe_keys, bt_n_floe_keys, sizeof(bt_floe_def)}};
     for (int t = 0; t < 2; t++) {
@@ -40,9 +38,8 @@ static void every_preset_and_range_is_well_formed(void **state)
 }
 
 // Sections are contiguous in the table: the resolved file would open a section twice otherwise.
-static void resolved_text_opens_each_section_once(void **state)
+TEST(resolved_text_opens_each_section_once)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c, base, &err)) fail_with(&err, "the smallest case is refused");
@@ -59,9 +56,8 @@ static void resolved_text_opens_each_section_once(void **state)
     bt_case_free(&c);
 }
 
-static void defaults_are_the_documented_ones(void **state)
+TEST(defaults_are_the_documented_ones)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c, base, &err)) fail_with(&err, "the smallest case is refused");
@@ -80,9 +76,8 @@ static void defaults_are_the_documented_ones(void **state)
     bt_case_free(&c);
 }
 
-static void a_geographic_domain_lies_about_the_origin(void **state)
+TEST(a_geographic_domain_lies_about_the_origin)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     if (read_text(&c,
@@ -95,9 +90,8 @@ static void a_geographic_domain_lies_about_the_origin(void **state)
     bt_case_free(&c);
 }
 
-static void every_key_is_listed(void **state)
+TEST(every_key_is_listed)
 {
-    (void)state;
     char *text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
@@ -112,9 +106,8 @@ static void every_key_is_listed(void **state)
     free(text);
 }
 
-static void suggestions_are_near_or_absent(void **state)
+TEST(suggestions_are_near_or_absent)
 {
-    (void)state;
     char buffer[64];
     assert_int_equal(bt_suggest_distance("speed", "sped", 9), 1);
     assert_int_equal(bt_suggest_distance("speed", "spede", 9), 1);
@@ -140,9 +133,8 @@ static void suggestions_are_near_or_absent(void **state)
 
 // ---- reading ----
 
-static void values_land_in_their_members(void **state)
+TEST(values_land_in_their_members)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     const char *text =
@@ -178,9 +170,8 @@ static void values_land_in_their_members(void **state)
     bt_case_free(&c);
 }
 
-static void all_errors_come_at_once_with_their_lines(void **state)
+TEST(all_errors_come_at_once_with_their_lines)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     const char *text = "run:\n"
@@ -238,9 +229,8 @@ static void all_errors_come_at_once_with_their_lines(void **state)
     bt_case_free(&c);
 }
 
-static void refuses_yaml_beyond_maps_lists_and_scalars(void **state)
+TEST(refuses_yaml_beyond_maps_lists_and_scalars)
 {
-    (void)state;
     static const struct { const char *text, *fragment;
     } bad[] = {
         {"run: {dt: 0.1, duration: 10}\nice: {size: 1}\nice: {size: 2}\n",
@@ -274,9 +264,8 @@ static void refuses_yaml_beyond_maps_lists_and_scalars(void **state)
     }
 }
 
-static void sizes_of_the_input_are_limited(void **state)
+TEST(sizes_of_the_input_are_limited)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     size_t n = (size_t)17 << 20;
@@ -300,9 +289,8 @@ static void sizes_of_the_input_are_limited(void **state)
     free(text);
 }
 
-static void a_missing_file_and_a_folder_are_input_errors(void **state)
+TEST(a_missing_file_and_a_folder_are_input_errors)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     assert_int_equal(bt_case_read(&c, "/nonexistent/a.yml", NULL, 0, &err), BT_ERR_IO);
@@ -314,9 +302,8 @@ static void a_missing_file_and_a_folder_are_input_errors(void **state)
     bt_errors_free(&err);
 }
 
-static void overrides_replace_the_file_and_are_named_in_errors(void **state)
+TEST(overrides_replace_the_file_and_are_named_in_errors)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     const char *text = "run: {dt: 0.1}\nice: {size: 1 kN, concentration: 0.2}\n";
@@ -360,21 +347,4 @@ static void overrides_replace_the_file_and_are_named_in_errors(void **state)
     bt_case_free(&c);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_preset_and_range_is_well_formed),
-        cmocka_unit_test(resolved_text_opens_each_section_once),
-        cmocka_unit_test(defaults_are_the_documented_ones),
-        cmocka_unit_test(a_geographic_domain_lies_about_the_origin),
-        cmocka_unit_test(every_key_is_listed),
-        cmocka_unit_test(suggestions_are_near_or_absent),
-        cmocka_unit_test(values_land_in_their_members),
-        cmocka_unit_test(all_errors_come_at_once_with_their_lines),
-        cmocka_unit_test(refuses_yaml_beyond_maps_lists_and_scalars),
-        cmocka_unit_test(sizes_of_the_input_are_limited),
-        cmocka_unit_test(a_missing_file_and_a_folder_are_input_errors),
-        cmocka_unit_test(overrides_replace_the_file_and_are_named_in_errors),
-    };
-    return cmocka_run_group_tests_name("case", tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

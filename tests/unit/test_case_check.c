@@ -4,11 +4,9 @@
 #include "case/case_tow.h"
 #include "case_text.h"
 
-#include <math.h>
 
-static void cross_checks_refuse(void **state)
+TEST(cross_checks_refuse)
 {
-    (void)state;
     static const struct { const char *set, *fragment;
     } bad[] = {
         {"run.dt=11", "--set run.dt=11: 11 s is more than run.duration"},
@@ -136,9 +134,8 @@ static void cross_checks_refuse(void **state)
     }
 }
 
-static void cross_checks_let_pass(void **state)
+TEST(cross_checks_let_pass)
 {
-    (void)state;
     static const char *const good[] = {
         "tow.speed=6.7", // 6.7 × (10 − 2.5) = 50 m of 67 m: the ramp counts
         "domain.ends=open;tow.speed=50",
@@ -182,9 +179,8 @@ static void cross_checks_let_pass(void **state)
     }
 }
 
-static void floes_by_hand_are_checked(void **state)
+TEST(floes_by_hand_are_checked)
 {
-    (void)state;
     static const struct { const char *floe, *fragment;
     } bad[] = {
         {"{x: 1, length: 1}", "a.yml:2: floes[0].y: missing"},
@@ -219,9 +215,8 @@ static void floes_by_hand_are_checked(void **state)
 }
 
 // The tow end after time t against the integral of its speed.
-static void tow_distance_is_the_integral_of_the_ramped_speed(void **state)
+TEST(tow_distance_is_the_integral_of_the_ramped_speed)
 {
-    (void)state;
     bt_case c;
     bt_case_defaults(&c);
     c.tow.speed = 0.7;
@@ -235,9 +230,8 @@ static void tow_distance_is_the_integral_of_the_ramped_speed(void **state)
 }
 
 // Expected number of floes of a power law against a sum over a fine histogram of N(>d) ~ d^-a.
-static void expected_floes_of_a_power_law(void **state)
+TEST(expected_floes_of_a_power_law)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     const char *set[] = {"ice.size_law=power",    "ice.size_min=0.5", "ice.size_max=5",
@@ -259,9 +253,8 @@ static void expected_floes_of_a_power_law(void **state)
     }
 }
 
-static void steps_do_not_gain_one_by_round_off(void **state)
+TEST(steps_do_not_gain_one_by_round_off)
 {
-    (void)state;
     bt_case c;
     bt_case_defaults(&c);
     c.run.duration = 450, c.run.dt = 0.1;
@@ -277,15 +270,4 @@ static void steps_do_not_gain_one_by_round_off(void **state)
     bt_case_free(&c);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cross_checks_refuse),
-        cmocka_unit_test(cross_checks_let_pass),
-        cmocka_unit_test(floes_by_hand_are_checked),
-        cmocka_unit_test(tow_distance_is_the_integral_of_the_ramped_speed),
-        cmocka_unit_test(expected_floes_of_a_power_law),
-        cmocka_unit_test(steps_do_not_gain_one_by_round_off),
-    };
-    return cmocka_run_group_tests_name("case, checks", tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

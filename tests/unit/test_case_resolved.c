@@ -3,7 +3,6 @@
 #include "case/schema.h"
 #include "case_text.h"
 
-#include <math.h>
 
 static uint64_t random_bits(void)
 {
@@ -107,9 +106,8 @@ static void compare(const bt_key *keys, int n, const void *a, const void *b)
 
 // Values of the whole range of every key, most of them no sensible case together: what counts is that the reader gets
 // the same bits, so its cross checks may complain, and the values must still be there.
-static void resolved_file_reads_back_to_the_same_bits(void **state)
+TEST(resolved_file_reads_back_to_the_same_bits)
 {
-    (void)state;
     for (int round = 0; round < 60; round++) {
         bt_case c, d;
         bt_errors err = {0};
@@ -138,9 +136,8 @@ static void resolved_file_reads_back_to_the_same_bits(void **state)
 }
 
 // From a case with derived defaults: resolving twice gives the same text, also from another folder.
-static void resolved_text_of_the_resolved_text_is_identical(void **state)
+TEST(resolved_text_of_the_resolved_text_is_identical)
 {
-    (void)state;
     static const char *const texts[] = {
         "run: {dt: 0.1, duration: 100}\nice: {field: some.h5}\n",
         "run: {dt: 0.3, duration: 100}\nbody: {shape: none}\n",
@@ -183,11 +180,4 @@ static void resolved_text_of_the_resolved_text_is_identical(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(resolved_file_reads_back_to_the_same_bits),
-        cmocka_unit_test(resolved_text_of_the_resolved_text_is_identical),
-    };
-    return cmocka_run_group_tests_name("case, resolved", tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

@@ -3,6 +3,7 @@
 // than a cell, boxes of few cells around a period, and floes of very different size.
 #include <sys/resource.h>
 
+#include "test.h"
 #include "space/pairs.h"
 #include "all_pairs.h"
 
@@ -70,9 +71,8 @@ static void check_cells(const bt_world *w)
 }
 
 // Red: `relabel` never set, or the distance outside taken from another cell.
-static void labels_follow_the_floes(void **state)
+TEST(labels_follow_the_floes)
 {
-    (void)state;
     bt_params p = cell_params();
     p.water_u = 0.3; // cells go with the water: the field stays behind, and goes across
     bt_world *w = bt_world_create(&p);
@@ -95,9 +95,8 @@ static void labels_follow_the_floes(void **state)
 }
 
 // Red: a cell at rest that is stepped all the same (n_active), or one that never wakes up (momentum).
-static void rest_costs_nothing_and_ends(void **state)
+TEST(rest_costs_nothing_and_ends)
 {
-    (void)state;
     const bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     enum { LONG = 60 };
@@ -158,9 +157,8 @@ static void check_busy(const bt_cells *t)
 
 // Red: a cell that contacts wake left out of the list; an awake cell that leaves it; a pair left out of the near ones
 // while it may close.
-static void a_step_looks_at_busy_cells_alone(void **state)
+TEST(a_step_looks_at_busy_cells_alone)
 {
-    (void)state;
     bt_world *w[2]; // the second looks at everything in every step
     bt_gid hitter = 0;
     for (int k = 0; k < 2; k++) {
@@ -222,9 +220,8 @@ static bt_world *tow_in_current(double u, double v, double speed, int steps, int
 
 // Red: cells that do not move with the water; a floe whose velocity the rounding of the drag takes off that of the
 // water.
-static void uniform_current_is_a_moving_frame(void **state)
+TEST(uniform_current_is_a_moving_frame)
 {
-    (void)state;
     // Rounding doubles every other step or so once floes rub, and sooner or later decides in which sweep a solve ends,
     // which is worth its tolerance: 1e-13 m here, 3e-6 m one step on, millimetres at 80.
     enum { STEPS = 39 };
@@ -254,9 +251,8 @@ static void uniform_current_is_a_moving_frame(void **state)
 
 // Red: displacements of an earlier step applied to floes that rest meanwhile (seen: their array is not cleared where
 // nothing moves).
-static void old_displacements_are_forgotten(void **state)
+TEST(old_displacements_are_forgotten)
 {
-    (void)state;
     bt_params p = cell_params();
     p.water_u = p.air_u = 0.25;
     bt_world *w = bt_world_create(&p);
@@ -317,9 +313,8 @@ static bt_world *hit_row(int n, double cell, int steps, bool *outrun, int64_t *r
 
 // Red: no look at what the solution outran (the far end of the row stays at rest, its neighbour runs into it, nothing
 // is said).
-static void a_blow_goes_through_a_row(void **state)
+TEST(a_blow_goes_through_a_row)
 {
-    (void)state;
     bool outrun;
     int64_t repeats;
     double lost;
@@ -349,9 +344,8 @@ static void a_blow_goes_through_a_row(void **state)
 }
 
 /// The work by which ranks are balanced is that of the sweeps, cell by cell: in batches, and of a large body.
-static void work_is_counted_cell_by_cell(void **state)
+TEST(work_is_counted_cell_by_cell)
 {
-    (void)state;
     bool outrun;
     int64_t repeats, before = 0;
     double lost;
@@ -397,9 +391,8 @@ static void check_contacts(bt_world *w, double margin)
 
 // Red: three cells around a period (two of one colour meet at the seam), two (a block that holds a cell twice), wrong
 // nearest cell.
-static void few_cells_around_a_period(void **state)
+TEST(few_cells_around_a_period)
 {
-    (void)state;
     uint64_t seed = 11;
     for (int around = 1; around <= 5; around++) { // periods of room for 1 to 5 cells of 4 m
         for (int both = 0; both < 2; both++) {
@@ -440,9 +433,8 @@ static void few_cells_around_a_period(void **state)
 }
 
 // Red: cells made for the mean size, so that a large floe touches others beyond its block.
-static void floes_of_very_different_size(void **state)
+TEST(floes_of_very_different_size)
 {
-    (void)state;
     uint64_t seed = 5;
     bt_params p = cell_params();
     p.cell = 2;
@@ -471,9 +463,8 @@ static void floes_of_very_different_size(void **state)
 
 // Red: a row of cells that does not fit into its integer (found by fuzzing a checkpoint): undefined, and on x86 the
 // whole field.
-static void a_body_far_away_covers_no_cell(void **state)
+TEST(a_body_far_away_covers_no_cell)
 {
-    (void)state;
     bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 5, 5, 0, 0);
@@ -497,9 +488,8 @@ static void a_body_far_away_covers_no_cell(void **state)
 
 // Red: rows for every cell around the period, of nanometres, where there is no floe (found by fuzzing, with cells of a
 // fifth: 2 GB and a minute).
-static void no_floes_need_no_rows(void **state)
+TEST(no_floes_need_no_rows)
 {
-    (void)state;
     bt_params p = cell_params();
     p.size = 5e-8, p.dt = 5e-7, p.slop = 5e-11;
     p.period_y = 300;
@@ -517,9 +507,8 @@ static void no_floes_need_no_rows(void **state)
 
 /// Light floes fly over many cells towards a heavy free body that stays where it is: the last cell, whose list has
 /// nothing of its own that moves, looks again in time, and each hits.
-static void floes_find_a_body_at_rest(void **state)
+TEST(floes_find_a_body_at_rest)
 {
-    (void)state;
     bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     for (int k = 0; k < 3; k++) {
@@ -541,9 +530,8 @@ static void floes_find_a_body_at_rest(void **state)
 }
 
 /// A floe that could meet another as fast from beyond the largest margin is reported; one just within is not.
-static void what_outruns_all_margins_is_reported(void **state)
+TEST(what_outruns_all_margins_is_reported)
 {
-    (void)state;
     const double dt = 0.1, sizes[] = {7.9, 8.1};
     for (int k = 0; k < 2; k++) {
         bt_params p = cell_params();
@@ -560,22 +548,4 @@ static void what_outruns_all_margins_is_reported(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(labels_follow_the_floes),
-        cmocka_unit_test(rest_costs_nothing_and_ends),
-        cmocka_unit_test(a_step_looks_at_busy_cells_alone),
-        cmocka_unit_test(uniform_current_is_a_moving_frame),
-        cmocka_unit_test(old_displacements_are_forgotten),
-        cmocka_unit_test(a_blow_goes_through_a_row),
-        cmocka_unit_test(work_is_counted_cell_by_cell),
-        cmocka_unit_test(few_cells_around_a_period),
-        cmocka_unit_test(floes_of_very_different_size),
-        cmocka_unit_test(floes_find_a_body_at_rest),
-        cmocka_unit_test(what_outruns_all_margins_is_reported),
-        cmocka_unit_test(a_body_far_away_covers_no_cell),
-        cmocka_unit_test(no_floes_need_no_rows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

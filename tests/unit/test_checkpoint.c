@@ -7,17 +7,9 @@
 // after each of them. What turns this red (tried): a member that the tables leave out: labels of the floes, whether
 // they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow line's impulse,
 // what is broken, the vessel's way, home.copy, open collisions.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-// cmocka.h wants setjmp.h, stdarg.h, stddef.h and stdint.h first
-#include <cmocka.h>
 
+#include "test.h"
 #include "output/checkpoint.h"
 #include "law_number.h"
 #include "loads/impact.h"
@@ -304,17 +296,15 @@ static void goes_on_from_every_step(const struct scenario *s)
     bt_case_free(&t.c);
 }
 
-static void a_run_goes_on_from_every_step(void **state)
+TEST(a_run_goes_on_from_every_step)
 {
-    (void)state;
     for (int k = 0; k < N_SCENARIOS; k++) goes_on_from_every_step(&scenarios[k]);
 }
 
 // --- the file --------------------------------------------------------------------------------------------------------
 
-static void a_file_gives_back_every_bit(void **state)
+TEST(a_file_gives_back_every_bit)
 {
-    (void)state;
     bt_errors err = {0};
     bt_snapshot s = {0}, back;
     const double reals[] = {0.1, -0.0, 1e-320, NAN, INFINITY, 3};
@@ -353,9 +343,8 @@ static void a_file_gives_back_every_bit(void **state)
     free(path);
 }
 
-static void the_first_difference_is_named(void **state)
+TEST(the_first_difference_is_named)
 {
-    (void)state;
     bt_snapshot a = {0}, b = {0};
     double x[] = {1, 2, 3, 4};
     char text[400];
@@ -404,9 +393,8 @@ static void refused(const char *path, size_t at)
 
 /// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the
 /// comparison with the checksum (tried) the first flip passes.
-static void damage_is_refused(void **state)
+TEST(damage_is_refused)
 {
-    (void)state;
     bt_errors err = {0};
     setting t = {.speed = 0};
     set_up(&scenarios[1], &t);
@@ -474,13 +462,7 @@ int main(void)
     if (!mkdtemp(folder)) return 1;
     write_file("wind.csv", wind);
     write_outlines();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_run_goes_on_from_every_step),
-        cmocka_unit_test(a_file_gives_back_every_bit),
-        cmocka_unit_test(the_first_difference_is_named),
-        cmocka_unit_test(damage_is_refused),
-    };
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    const int failed = run_all_tests(NULL, NULL);
     char command[160];
     snprintf(command, sizeof command, "rm -rf %s", folder);
     return system(command) != 0 || failed;

@@ -3,16 +3,7 @@
 //
 //     test_comm                 the tests; the second half starts mpirun -n R test_comm ranks
 //     test_comm ranks           what each rank checks
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-// cmocka.h wants the headers above first
-#include <cmocka.h>
-
+#include "test.h"
 #include "bergtow/comm.h"
 
 static const char *self = "test_comm";
@@ -144,9 +135,8 @@ static int all_checks(void)
     return BT_OK;
 }
 
-static void one_rank_needs_no_mpi(void **state)
+TEST(one_rank_needs_no_mpi)
 {
-    (void)state;
     unsetenv("OMPI_COMM_WORLD_SIZE");
     unsetenv("PMIX_RANK");
     bt_comm_start(NULL, NULL);
@@ -170,18 +160,16 @@ static int mpirun(int ranks, const char *word)
     return WEXITSTATUS(status);
 }
 
-static void several_ranks(void **state)
+TEST(several_ranks)
 {
-    (void)state;
     for (int ranks = 1; ranks <= 4; ranks++) {
         const int code = mpirun(ranks, "ranks");
         if (code) fail_msg("%d ranks: code %d, see %s.log", ranks, code, self);
     }
 }
 
-static void all_ranks_leave_with_the_worst_code(void **state)
+TEST(all_ranks_leave_with_the_worst_code)
 {
-    (void)state;
     assert_int_equal(mpirun(3, "worst"), BT_ERR_IO);
     assert_int_equal(mpirun(2, "alone"), BT_ERR_NUMERIC); // the other waits for ever
     assert_int_equal(mpirun(2, "usage"), BT_ERR_USAGE);
@@ -201,10 +189,5 @@ int main(int argc, char **argv)
         else bt_comm_rest(c);
         return bt_comm_end(code);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_rank_needs_no_mpi),
-        cmocka_unit_test(several_ranks),
-        cmocka_unit_test(all_ranks_leave_with_the_worst_code),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

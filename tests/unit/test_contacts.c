@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Contact detection: the optimised path against all pairs, distances against an independent computation, features.
+#include "test.h"
 #include "all_pairs.h"
 
 #include "contact/row.h"
@@ -132,9 +133,8 @@ static int64_t new_lists(bt_world *w, double margin)
     return n;
 }
 
-static void detect_equals_brute_force(void **state)
+TEST(detect_equals_brute_force)
 {
-    (void)state;
     uint64_t rng = 7;
     int64_t total = 0, labellings = 0;
     for (int scene = 0; scene < 12; scene++) {
@@ -189,9 +189,8 @@ static bt_world *heap(uint64_t *rng, int n)
 }
 
 /// What a pair has kept of its last search changes nothing, however the two have moved; and it spares most searches.
-static void kept_edges_change_nothing(void **state)
+TEST(kept_edges_change_nothing)
 {
-    (void)state;
     enum { BODIES = 30, PAIRS = BODIES * (BODIES - 1) / 2 };
     uint64_t rng = 17;
     int looks = 0, searches = 0, touching = 0;
@@ -231,9 +230,8 @@ static void kept_edges_change_nothing(void **state)
 }
 
 /// Every separate pair nearer than the margin has a manifold, its least gap is the distance, and none is farther.
-static void gaps_are_distances(void **state)
+TEST(gaps_are_distances)
 {
-    (void)state;
     uint64_t rng = 11;
     int seen = 0, corners = 0;
     for (int scene = 0; scene < 10; scene++) {
@@ -274,9 +272,8 @@ static void gaps_are_distances(void **state)
 }
 
 /// Both arms of a point end in the same place, on the surfaces' middle; the normal points from a to b.
-static void arms_meet(void **state)
+TEST(arms_meet)
 {
-    (void)state;
     uint64_t rng = 3;
     bt_world *w = random_scene(&rng, 200, true, 15);
     bt_manifold *man;
@@ -326,9 +323,8 @@ static bt_world *two_squares(double x, double y)
 }
 
 /// Two squares edge to edge: two points at the ends of the shared edge, the same features while they slide a little.
-static void edge_contact_keeps_its_features(void **state)
+TEST(edge_contact_keeps_its_features)
 {
-    (void)state;
     bt_world *w = two_squares(1.01, 0.3);
     uint32_t features[2] = {0, 0};
     for (int s = 0; s < 50; s++) {
@@ -362,9 +358,8 @@ static void edge_contact_keeps_its_features(void **state)
 
 /// Two squares whose edges face each other along a millionth of their length: two points, and no telling how they share
 /// the load. Solved together they would take the difference of two impulses of any size.
-static void points_that_all_but_coincide_are_not_solved_together(void **state)
+TEST(points_that_all_but_coincide_are_not_solved_together)
 {
-    (void)state;
     bt_world *w = two_squares(1.01, 1 - 1e-6);
     detect_all(w, 0.05);
     assert_int_equal(w->cells->n_contacts, 1);
@@ -375,15 +370,4 @@ static void points_that_all_but_coincide_are_not_solved_together(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(detect_equals_brute_force),
-        cmocka_unit_test(kept_edges_change_nothing),
-        cmocka_unit_test(gaps_are_distances),
-        cmocka_unit_test(arms_meet),
-        cmocka_unit_test(edge_contact_keeps_its_features),
-        cmocka_unit_test(points_that_all_but_coincide_are_not_solved_together),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

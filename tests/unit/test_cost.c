@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a run needs of a machine, and the refusal of what it has not.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
+#include "test.h"
 #include "output/record.h"
 #include "case/cost.h"
 
@@ -22,9 +15,8 @@ static bt_case a_case(void)
 // By hand: 30 MB + n (2048/ranks + 200) and 450 B a part on each rank of the node, and on one n 300 for a checkpoint, a
 // quarter more than 200 B of each of a million steps, 810 B an entry, here of 100,000, up to 110 MB, and 0.14 MB a
 // frame, here of 501, up to 60 MB; with collisions 32 B for each of 36 panels and 3125 blocks of 320 steps.
-static void memory_by_hand(void **state)
+TEST(memory_by_hand)
 {
-    (void)state;
     bt_case c = a_case();
     const double kept = 250e6 + 81e6 + 60e6;
     assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept, 1);
@@ -39,9 +31,8 @@ static void memory_by_hand(void **state)
 
 // By hand: 0.1 s, a million steps of 8 µs, 100,000 entries of 17 µs, 501 frames of 1 ms and 1.6 µs a floe; 1000 floes
 // of 0.8 µs at 50 %, and of 100 floes in 10 parts each 0.05 µs a part and 6 ns for half the pairs of them.
-static void time_by_hand(void **state)
+TEST(time_by_hand)
 {
-    (void)state;
     bt_case c = a_case();
     bt_cost_ice ice = {.floes = 1000, .concentration = 0.5};
     const double rest = 0.1 + 8 + 1.7 + 501 * 2.6e-3;
@@ -60,9 +51,8 @@ static void time_by_hand(void **state)
 // and 32 B of ParaView's speed, velocity and forces, with 5840 B for the group, its datasets and the other bodies; ids
 // and outlines 4 + 24 + 96 + 32 B; 100,096 entries (whole chunks of 256) of 8 B a series; one chunk of collisions; 350
 // kB of HDF5.
-static void disk_by_hand(void **state)
+TEST(disk_by_hand)
 {
-    (void)state;
     bt_case c = a_case();
     const double series = 8.0 * 100096, rest = 350e3 + 8.0 * 256 * 13;
     assert_float_equal(bt_cost_frames(&c), 501, 0);
@@ -80,9 +70,8 @@ static void disk_by_hand(void **state)
     assert_float_equal(bt_cost_disk_of(&c, 0, 0, 2).result, 501 * 5840 + series * (bt_n_series() + 108) + rest, 1);
 }
 
-static void a_step_has_one_frame_at_most(void **state)
+TEST(a_step_has_one_frame_at_most)
 {
-    (void)state;
     bt_case c = {.run = {.dt = 1, .duration = 10}, .output = {.frame_interval = 0.1}};
     assert_float_equal(bt_cost_frames(&c), 11, 0);
     c.output.frame_interval = 4; // at 0, 4, 8, and the end
@@ -91,9 +80,8 @@ static void a_step_has_one_frame_at_most(void **state)
     assert_float_equal(bt_cost_frames(&c), 3, 0);
 }
 
-static void what_does_not_fit_is_refused_with_both_numbers(void **state)
+TEST(what_does_not_fit_is_refused_with_both_numbers)
 {
-    (void)state;
     const bt_case c = a_case();
     bt_errors err = {0};
     assert_int_equal(bt_cost_fits(&c, 1e6, &bt_comm_alone, 2.970e9, &err), BT_OK);
@@ -109,14 +97,4 @@ static void what_does_not_fit_is_refused_with_both_numbers(void **state)
     assert_true(bt_cost_machine() > 1e6 && isfinite(bt_cost_machine()));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(memory_by_hand),
-        cmocka_unit_test(time_by_hand),
-        cmocka_unit_test(disk_by_hand),
-        cmocka_unit_test(a_step_has_one_frame_at_most),
-        cmocka_unit_test(what_does_not_fit_is_refused_with_both_numbers),
-    };
-    return cmocka_run_group_tests_name("cost", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

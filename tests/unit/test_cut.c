@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The cut of a cell graph: balance, edge cut against straight cuts, groups, odd weights, stable labels, signals.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 #include <pthread.h>
 #include <signal.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
+#include "test.h"
 #include "bergtow/base.h"
 #include "partition/cut.h"
 
@@ -110,9 +103,8 @@ static int64_t straight_cut(const grid *t, int kx, int ky)
     return c;
 }
 
-static void test_measure(void **state)
+TEST(test_measure)
 {
-    (void)state;
     grid t;
     grid_init(&t, 3, 2, 5, 1); // 0 0 1 over 0 1 1, by hand
     t.weight[5] = 7;
@@ -133,9 +125,8 @@ static void test_measure(void **state)
     grid_free(&t);
 }
 
-static void test_grid(void **state)
+TEST(test_grid)
 {
-    (void)state;
     static const struct {
         int nx, ny, kx, ky;
     } c[] = {{64, 64, 2, 1}, {64, 64, 2, 2}, {60, 40, 3, 2}, {96, 96, 8, 8}, {16, 64, 4, 16}};
@@ -153,9 +144,8 @@ static void test_grid(void **state)
 }
 
 // A few uneven cells a part: METIS alone is 5 and 11 % out of balance at 150 and 200 parts.
-static void test_few_cells_a_part(void **state)
+TEST(test_few_cells_a_part)
 {
-    (void)state;
     grid t;
     grid_init(&t, 40, 40, 0, 16);
     for (int i = 0; i < t.g.n; i++) t.weight[i] = 60 + (i * 7919) % 23;
@@ -168,9 +158,8 @@ static void test_few_cells_a_part(void **state)
     grid_free(&t);
 }
 
-static void test_groups(void **state)
+TEST(test_groups)
 {
-    (void)state;
     grid t;
     grid_init(&t, 20, 20, 100, 10);
     for (int y = 8; y < 13; y++)
@@ -194,9 +183,8 @@ static void test_groups(void **state)
 
 // A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves
 // that cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
-static void test_group_edges(void **state)
+TEST(test_group_edges)
 {
-    (void)state;
     const int start[] = {0, 1, 2, 3, 7, 9, 10}, to[] = {3, 3, 3, 0, 1, 2, 4, 3, 5, 4}, group[] = {2, 2, 2, -1, -1, -1};
     const int64_t edge[] = {2, 2, 2, 2, 2, 2, 5, 5, 1, 1}, weight[] = {10, 10, 10, 20, 30, 20};
     const double at[][2] = {{0, 0}, {0, 0}, {0, 0}, {3, 0}, {2, 0}, {1, 0}}; // bisection finds the second
@@ -221,9 +209,8 @@ static double imbalance_of_others(const grid *t, int n_parts, const int *part, i
     return (double)most * (n_parts - 1) / (double)sum - 1;
 }
 
-static void test_one_heavy(void **state)
+TEST(test_one_heavy)
 {
-    (void)state;
     grid t;
     grid_init(&t, 30, 30, 10, 3);
     t.weight[435] = 100000;
@@ -240,9 +227,8 @@ static void test_one_heavy(void **state)
     grid_free(&t);
 }
 
-static void test_weights(void **state)
+TEST(test_weights)
 {
-    (void)state;
     // all the same cut, whatever the contact: sum above 2³¹, above 2⁵³, near 2⁶³; and no weight at all
     static const int64_t weight[] = {1, 3000000, INT64_C(1) << 44, INT64_MAX / 1024 - 1, 0};
     grid t;
@@ -277,9 +263,8 @@ static void test_weights(void **state)
     grid_free(&t);
 }
 
-static void test_disconnected(void **state)
+TEST(test_disconnected)
 {
-    (void)state;
     grid t;
     grid_init(&t, 30, 30, 7, 2);
     // remove every edge over the gaps x = 10, 20: three islands, and without any edge at all
@@ -303,9 +288,8 @@ static void test_disconnected(void **state)
     grid_free(&t);
 }
 
-static void test_few_vertices(void **state)
+TEST(test_few_vertices)
 {
-    (void)state;
     bt_cut_quality q;
     grid t;
     grid_init(&t, 5, 1, 3, 1);
@@ -340,9 +324,8 @@ static void test_few_vertices(void **state)
         }
 }
 
-static void test_bisection(void **state)
+TEST(test_bisection)
 {
-    (void)state;
     // alone: balance, and a cut that straight lines cannot beat by much
     grid t;
     grid_init(&t, 64, 64, 9, 1);
@@ -387,9 +370,8 @@ static void test_bisection(void **state)
     assert_true(n_used > 0);
 }
 
-static void test_labels_stay(void **state)
+TEST(test_labels_stay)
 {
-    (void)state;
     grid t;
     grid_init(&t, 48, 48, 20, 4);
     bt_cut_quality q;
@@ -431,9 +413,8 @@ static void test_labels_stay(void **state)
 }
 
 // A berg of 3 × 3 cells with a heavy wake moves on by a cell a time.
-static void test_moving_spot(void **state)
+TEST(test_moving_spot)
 {
-    (void)state;
     grid t;
     grid_init(&t, 60, 60, 0, 16);
     int *part = labels(&t, -1), *fresh = labels(&t, -1);
@@ -483,9 +464,8 @@ static void *terminate(void *us)
     return NULL;
 }
 
-static void test_signals(void **state)
+TEST(test_signals)
 {
-    (void)state;
     struct sigaction action = {.sa_handler = on_term, .sa_flags = SA_RESTART}, saved, after;
     sigaddset(&action.sa_mask, SIGUSR1);
     sigaction(SIGTERM, &action, &saved);
@@ -514,22 +494,4 @@ static void test_signals(void **state)
     grid_free(&t);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_measure),
-        cmocka_unit_test(test_grid),
-        cmocka_unit_test(test_few_cells_a_part),
-        cmocka_unit_test(test_group_edges),
-        cmocka_unit_test(test_groups),
-        cmocka_unit_test(test_one_heavy),
-        cmocka_unit_test(test_weights),
-        cmocka_unit_test(test_disconnected),
-        cmocka_unit_test(test_few_vertices),
-        cmocka_unit_test(test_bisection),
-        cmocka_unit_test(test_labels_stay),
-        cmocka_unit_test(test_moving_spot),
-        cmocka_unit_test(test_signals),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

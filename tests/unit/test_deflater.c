@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Chunks as HDF5's filters read them back: every number returns, and no kind of plane takes more room than by zlib's
 // level 1 alone.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
 #include <zlib.h>
 
+#include "test.h"
 #include "base/h5util.h"
 #include "base/rng.h"
 
@@ -35,9 +30,8 @@ static size_t length_of(bt_deflater **d, const void *numbers, size_t n, size_t s
     return length;
 }
 
-static void test_numbers_return(void **state)
+TEST(test_numbers_return)
 {
-    (void)state;
     static double noise[N], rest[N], few[N];
     static int32_t ids[N];
     static float flat[N];
@@ -60,8 +54,4 @@ static void test_numbers_return(void **state)
     bt_deflater_free(d);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_numbers_return)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

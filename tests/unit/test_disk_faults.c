@@ -4,17 +4,11 @@
 // known as ours.
 #include <errno.h>
 #include <hdf5.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <cmocka.h>
 
+#include "test.h"
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
@@ -102,9 +96,8 @@ static int every(int kind, int first, const char *path, bt_status (*work)(const 
     }
 }
 
-static void each_failed_call_is_reported(void **state)
+TEST(each_failed_call_is_reported)
 {
-    (void)state;
     char path[] = "/tmp/bergtow-faults-XXXXXX";
     bt_errors err = {0};
     assert_int_equal(close(mkstemp(path)), 0);
@@ -121,9 +114,8 @@ static void each_failed_call_is_reported(void **state)
 /// A signal in the middle of a sync is no failure, nor proof that bytes are on the disk: it is made again. After one at
 /// a close the descriptor is gone all the same, and may be another file's by then: it is not closed again. What is no
 /// signal is a failure.
-static void a_signal_at_a_sync_and_at_a_close(void **state)
+TEST(a_signal_at_a_sync_and_at_a_close)
 {
-    (void)state;
     char path[] = "/tmp/bergtow-signal-XXXXXX";
     for (int signal = 0; signal < 2; signal++) {
         const int sync_reason = reason_of[SYNC], close_reason = reason_of[CLOSE];
@@ -143,9 +135,8 @@ static void a_signal_at_a_sync_and_at_a_close(void **state)
 }
 
 /// A signal while bytes go to the disk or come from it is no failure: the call is made again.
-static void a_signal_while_bytes_move(void **state)
+TEST(a_signal_while_bytes_move)
 {
-    (void)state;
     char path[] = "/tmp/bergtow-signal-XXXXXX", back[8] = "";
     const int write_reason = reason_of[WRITE], read_reason = reason_of[READ];
     const int fd = mkstemp(path);
@@ -169,9 +160,8 @@ static void a_signal_while_bytes_move(void **state)
 }
 
 /// A text of which the system gives a part and then an error: here nothing at all, and the error at once.
-static void a_text_that_cannot_be_read(void **state)
+TEST(a_text_that_cannot_be_read)
 {
-    (void)state;
     char *text = NULL;
     size_t size = 0;
     bt_errors err = {0};
@@ -182,9 +172,8 @@ static void a_text_that_cannot_be_read(void **state)
 }
 
 /// It has fewer bytes than the system said it has, as one that becomes shorter while it is read.
-static void a_file_with_fewer_bytes_than_its_size(void **state)
+TEST(a_file_with_fewer_bytes_than_its_size)
 {
-    (void)state;
     bt_errors err = {0};
     assert_int_equal(bt_checksum_check("/sys/kernel/fscaps", BT_CHECKSUM_FIELD, NULL, &err), BT_ERR_IO);
     bt_errors_free(&err);
@@ -192,9 +181,8 @@ static void a_file_with_fewer_bytes_than_its_size(void **state)
 
 /// Nothing, zeros, or HDF5: what a file of ours is before its seal. A seal is found at the end; anything else is
 /// somebody else's.
-static void what_was_cut_off_early_is_ours(void **state)
+TEST(what_was_cut_off_early_is_ours)
 {
-    (void)state;
     static const char seal[] = "bergtow sealed file\nkind: field 9\n", hdf5[] = "\x89HDF\r\n\x1a\n";
     const struct {
         const char *name;
@@ -224,15 +212,4 @@ static void what_was_cut_off_early_is_ours(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_failed_call_is_reported),
-        cmocka_unit_test(a_signal_at_a_sync_and_at_a_close),
-        cmocka_unit_test(a_signal_while_bytes_move),
-        cmocka_unit_test(a_text_that_cannot_be_read),
-        cmocka_unit_test(a_file_with_fewer_bytes_than_its_size),
-        cmocka_unit_test(what_was_cut_off_early_is_ours),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

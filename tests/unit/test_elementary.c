@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Elementary functions: their error against long double, their ends, and a checksum of their bits that every compiler
 // and machine must give.
+#include "test.h"
 #include "bergtow/base.h"
 #include "base/elementary.h"
 
 #include <float.h>
 #include <inttypes.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <setjmp.h>
-#include <string.h>
-#include <cmocka.h>
 
 #include "base/rng.h"
 
@@ -56,9 +50,8 @@ static double error_in_ulps(double value, long double exact)
     return (double)(fabsl((long double)value - exact) / unit);
 }
 
-static void errors_stay_below_their_bounds(void **state)
+TEST(errors_stay_below_their_bounds)
 {
-    (void)state;
     if (LDBL_MANT_DIG <= DBL_MANT_DIG) skip(); // nothing better to hold them against: the checksum does
     for (size_t k = 0; k < sizeof functions / sizeof *functions; k++) {
         const function *f = &functions[k];
@@ -72,9 +65,8 @@ static void errors_stay_below_their_bounds(void **state)
     }
 }
 
-static void errors_of_two_arguments_stay_below_their_bounds(void **state)
+TEST(errors_of_two_arguments_stay_below_their_bounds)
 {
-    (void)state;
     if (LDBL_MANT_DIG <= DBL_MANT_DIG) skip();
     double arc = 0, root = 0, power = 0;
     for (int i = 0; i < N; i++) {
@@ -90,9 +82,8 @@ static void errors_of_two_arguments_stay_below_their_bounds(void **state)
     assert_true(arc < 2 && root < 1.3 && power < 1);
 }
 
-static void ends_are_those_of_the_standard(void **state)
+TEST(ends_are_those_of_the_standard)
 {
-    (void)state;
     const double zero = 0, tiny = 0x1p-1074, huge = DBL_MAX;
     double s, c;
     bt_sincos(0, &s, &c);
@@ -129,9 +120,8 @@ static void add(uint64_t *hash, double x)
 }
 
 /// The one test that compares machines: what this number is here, it is with any compiler, libm and processor.
-static void bits_are_those_of_every_machine(void **state)
+TEST(bits_are_those_of_every_machine)
 {
-    (void)state;
     uint64_t hash = UINT64_C(14695981039346656037);
     for (size_t k = 0; k < sizeof functions / sizeof *functions; k++)
         for (int i = 0; i < 20000; i++) add(&hash, functions[k].of(argument(&functions[k], i)));
@@ -146,13 +136,4 @@ static void bits_are_those_of_every_machine(void **state)
     assert_true(hash == UINT64_C(0x3a444cd7af690146));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_stay_below_their_bounds),
-        cmocka_unit_test(errors_of_two_arguments_stay_below_their_bounds),
-        cmocka_unit_test(ends_are_those_of_the_standard),
-        cmocka_unit_test(bits_are_those_of_every_machine),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The estimates at points computed by hand, at the edges of their regimes, and at two scales.
+#include "test.h"
 #include "bergtow/estimate.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 // 80 m across, 0.5 m/s, ice of 1 m: rho_i h W V² = 910 · 1 · 80 · 0.25 = 18 200 N.
 static bt_estimate_input berg(double a)
@@ -45,9 +38,8 @@ static void check(bt_estimate e, double want, bool valid, int line)
 }
 #define CHECK(kind, in, want, valid) check(bt_estimate_at(BT_EST_##kind, &(in)), want, valid, __LINE__)
 
-static void lichey_hellmer_in_its_regimes(void **state)
+TEST(lichey_hellmer_in_its_regimes)
 {
-    (void)state;
     bt_estimate_input in = berg(0.15);
     CHECK(LICHEY_HELLMER, in, 0, true); // the threshold itself has no force
     in = berg(nextafter(0.15, 1)); // nor is what rounding may have made of it
@@ -76,9 +68,8 @@ static void lichey_hellmer_in_its_regimes(void **state)
     CHECK(LICHEY_HELLMER, in, 45500, true);
 }
 
-static void a_current_across_or_from_behind(void **state)
+TEST(a_current_across_or_from_behind)
 {
-    (void)state;
     bt_estimate_input in = berg(0.5);
     in.speed = in.water_speed = 0.5, in.along = in.water_along = 0.3; // ½ · 910 · 80 · 0.5 · 0.3
     CHECK(LICHEY_HELLMER, in, 5460, true);
@@ -95,9 +86,8 @@ static void a_current_across_or_from_behind(void **state)
     CHECK(LICHEY_HELLMER, in, 0.6 * 40e3 * 80 * 0.36787944117144233, true);
 }
 
-static void three_closures(void **state)
+TEST(three_closures)
 {
-    (void)state;
     bt_estimate_input in = berg(0.95);
     CHECK(COMPACTION, in, 1.6e6 * 0.36787944117144233, true);
     in = berg(1);
@@ -131,9 +121,8 @@ static void three_closures(void **state)
     assert_true(isnan(e.force) && !e.valid);
 }
 
-static void dilute_limit_and_open_water(void **state)
+TEST(dilute_limit_and_open_water)
 {
-    (void)state;
     bt_estimate_input in = berg(0.1); // 4/3 · 0.1 · 910 · 55 · 0.25
     CHECK(DILUTE, in, 1668.3333333333333, true);
     in.restitution = 0.5;
@@ -146,9 +135,8 @@ static void dilute_limit_and_open_water(void **state)
         check(bt_estimate_at(k, &in), k == BT_EST_OPEN_WATER ? 1000 : 0, true, __LINE__);
 }
 
-static void without_tow_nothing_has_a_value(void **state)
+TEST(without_tow_nothing_has_a_value)
 {
-    (void)state;
     bt_estimate_input in = berg(0.8);
     in.speed = in.along = NAN;
     for (int k = 0; k < bt_n_estimates(); k++) {
@@ -175,9 +163,8 @@ static void read_case(bt_case *c, const char *text)
     assert_int_equal(status, BT_OK);
 }
 
-static void conditions_follow_from_the_case(void **state)
+TEST(conditions_follow_from_the_case)
 {
-    (void)state;
     bt_case c;
     bt_estimate_input in;
     // Towed along y with the long side along x, a current of (0.3, 0.1): ΔV = (−0.3, 0.4), 0.5 m/s, 0.4 m/s along.
@@ -210,9 +197,8 @@ static void conditions_follow_from_the_case(void **state)
 
 // Power law a = 2 on [10, 40]: <d³>/<d²> = 30 / ln 4. Lognormal with s = 0.5: 20 · 1.25². A field's own mean is
 // compared to that.
-static void floe_size_is_weighted_with_area(void **state)
+TEST(floe_size_is_weighted_with_area)
 {
-    (void)state;
     bt_case c;
     bt_estimate_input in;
     read_case(&c,
@@ -238,9 +224,8 @@ static void floe_size_is_weighted_with_area(void **state)
 }
 
 // Two floes of 1 and 3 m² and 0.1 and 0.5 m: h = (0.1 + 1.5)/4, not the mean of the two numbers.
-static void thickness_is_weighted_with_area(void **state)
+TEST(thickness_is_weighted_with_area)
 {
-    (void)state;
     bt_field f;
     bt_field_init(&f);
     const double small[8] = {0, 0, 1, 0, 1, 1, 0, 1}, big[8] = {0, 0, 3, 0, 3, 1, 0, 1};
@@ -255,9 +240,8 @@ static void thickness_is_weighted_with_area(void **state)
 }
 
 // Every estimate of a model, times the cube of the scale, is that of full scale: also where capture begins.
-static void model_and_full_scale_agree(void **state)
+TEST(model_and_full_scale_agree)
 {
-    (void)state;
     for (int k = 0; k < 2; k++) {
         bt_case c;
         char text[400];
@@ -286,18 +270,4 @@ static void model_and_full_scale_agree(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lichey_hellmer_in_its_regimes),
-        cmocka_unit_test(a_current_across_or_from_behind),
-        cmocka_unit_test(three_closures),
-        cmocka_unit_test(dilute_limit_and_open_water),
-        cmocka_unit_test(without_tow_nothing_has_a_value),
-        cmocka_unit_test(conditions_follow_from_the_case),
-        cmocka_unit_test(floe_size_is_weighted_with_area),
-        cmocka_unit_test(thickness_is_weighted_with_area),
-        cmocka_unit_test(model_and_full_scale_agree),
-    };
-    return cmocka_run_group_tests_name("estimate", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: MIT
 // A contact problem in FCLIB's format, read back dataset by dataset as FCLIB's own reader does.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <cmocka.h>
 #include <hdf5.h>
 
+#include "test.h"
 #include "bergtow/fclib.h"
 
 // Two contacts on one body of unit mass, the second also held by a heavier one: W couples them.
@@ -76,9 +70,8 @@ static void check_text(hid_t f, const char *name, const char *expected)
     H5Dclose(d);
 }
 
-static void the_problem_comes_back(void **state)
+TEST(the_problem_comes_back)
 {
-    (void)state;
     bt_errors err = {0};
     assert_int_equal(write_it(path, N, u, &err), BT_OK);
     const hid_t f = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -99,9 +92,8 @@ static void the_problem_comes_back(void **state)
     H5Fclose(f);
 }
 
-static void the_solution_may_be_absent(void **state)
+TEST(the_solution_may_be_absent)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_fclib_problem p = {.n = N, .w_ptr = ptr, .w_col = col, .w_val = val, .q = q, .mu = mu};
     assert_int_equal(bt_fclib_write(path, &p, &err), BT_OK);
@@ -111,9 +103,8 @@ static void the_solution_may_be_absent(void **state)
     H5Fclose(f);
 }
 
-static void what_cannot_be_written_is_refused(void **state)
+TEST(what_cannot_be_written_is_refused)
 {
-    (void)state;
     bt_errors err = {0};
     unlink(path);
     assert_int_equal(write_it(path, 0, u, &err), BT_ERR_USAGE);
@@ -143,12 +134,7 @@ int main(int argc, char **argv)
         return status;
     }
     snprintf(path, sizeof path, "/tmp/bergtow-fclib-%d.h5", (int)getpid());
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_problem_comes_back),
-        cmocka_unit_test(the_solution_may_be_absent),
-        cmocka_unit_test(what_cannot_be_written_is_refused),
-    };
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    const int failed = run_all_tests(NULL, NULL);
     unlink(path);
     return failed;
 }

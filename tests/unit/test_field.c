@@ -1,17 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The ice field: concentration, no overlap, randomness and size laws of every generator.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
+#include "test.h"
 #include "bergtow/contact.h"
 #include "bergtow/field.h"
 #include "bergtow/forces.h"
@@ -186,16 +177,14 @@ static void assert_makes(bt_case c, bt_ice_shape shape, double concentration, co
     bt_field_free(&f);
 }
 
-static void test_voronoi(void **state)
+TEST(test_voronoi)
 {
-    (void)state;
     const double all[] = {0, 0.2, 0.5, 0.8, 0.95};
     for (int k = 0; k < 5; k++) assert_makes(basin(), BT_ICE_VORONOI, all[k], "voronoi");
 }
 
-static void test_rectangles(void **state)
+TEST(test_rectangles)
 {
-    (void)state;
     const double all[] = {0, 0.2, 0.5, 0.8, 0.95};
     for (int k = 0; k < 5; k++) assert_makes(basin(), BT_ICE_RECTANGLES, all[k], "rectangles");
     // away from the body every floe is a rectangle, with the aspect asked for where there is room
@@ -212,9 +201,8 @@ static void test_rectangles(void **state)
     bt_field_free(&f);
 }
 
-static void test_polygons(void **state)
+TEST(test_polygons)
 {
-    (void)state;
     const double all[] = {0.2, 0.5, 0.7};
     for (int sides = 4; sides <= 6; sides += 2)
         for (int k = 0; k < 3; k++) {
@@ -234,9 +222,8 @@ static void test_polygons(void **state)
     bt_field_free(&f);
 }
 
-static void test_surroundings(void **state)
+TEST(test_surroundings)
 {
-    (void)state;
     // periodic both ways, the body over the edge
     bt_case c = basin();
     c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC;
@@ -295,9 +282,8 @@ static bool same(const bt_field *f, const bt_field *g)
            memcmp(f->area, g->area, (size_t)f->n * sizeof *f->area) == 0;
 }
 
-static void test_seed(void **state)
+TEST(test_seed)
 {
-    (void)state;
     for (int shape = BT_ICE_VORONOI; shape <= BT_ICE_POLYGONS; shape++) {
         bt_case c = basin();
         c.ice.shape = (bt_ice_shape)shape, c.ice.concentration = 0.6, c.ice.thickness_law = BT_THICK_LOGNORMAL;
@@ -396,9 +382,8 @@ static void assert_shares(const bt_case *large, bt_case c, const char *what)
 
 // Red where the strip is not scaled (concentration), all floes are (bits), thickness follows the cut (bits), or the
 // body's image over the seam is forgotten (overlap).
-static void test_cut(void **state)
+TEST(test_cut)
 {
-    (void)state;
     const double concentration[] = {0.2, 0.5, 0.8, 0.9};
     for (int k = 0; k < 4; k++)
         for (int seed = 7; seed < 9; seed++) {
@@ -449,9 +434,8 @@ static void test_cut(void **state)
     bt_field_free(&g);
 }
 
-static void test_size_laws(void **state)
+TEST(test_size_laws)
 {
-    (void)state;
     bt_case c = basin();
     c.ice.size = 30;
     c.ice.size_spread = 0;
@@ -488,9 +472,8 @@ static double likely_exponent(bt_idx n, const double *area, double m, double M)
     return low;
 }
 
-static void test_sizes_of_fields(void **state)
+TEST(test_sizes_of_fields)
 {
-    (void)state;
     for (int shape = BT_ICE_VORONOI; shape <= BT_ICE_RECTANGLES; shape++) {
         bt_case c = basin();
         c.ice.shape = (bt_ice_shape)shape, c.ice.shake = 0;
@@ -516,9 +499,8 @@ static void test_sizes_of_fields(void **state)
     }
 }
 
-static void test_thickness(void **state)
+TEST(test_thickness)
 {
-    (void)state;
     bt_case c = basin();
     c.domain.length = c.ice.x_max = 120, c.ice.shake = 0;
     bt_field f = made(&c);
@@ -552,9 +534,8 @@ static double variation_of_gaps(const bt_case *c)
     return sqrt(sum2 - sum * sum) / sum;
 }
 
-static void test_relaxed(void **state)
+TEST(test_relaxed)
 {
-    (void)state;
     // Gap to the nearest neighbour: nearly the same everywhere in a shrunken tessellation, close to exponential in a
     // gas.
     const double all[] = {0.3, 0.5, 0.8};
@@ -570,9 +551,8 @@ static void test_relaxed(void **state)
     }
 }
 
-static void test_orientation(void **state)
+TEST(test_orientation)
 {
-    (void)state;
     bt_case c = basin();
     c.ice.shape = BT_ICE_RECTANGLES, c.ice.concentration = 0.4, c.body.shape = BT_BODY_ABSENT;
     c.domain.length = c.ice.x_max = 40, c.domain.width = 20, c.ice.y_max = 15;
@@ -598,9 +578,8 @@ static void test_orientation(void **state)
     }
 }
 
-static void test_space_order(void **state)
+TEST(test_space_order)
 {
-    (void)state;
     // along a space-filling curve the next floe is near: at random it would be 12 m away on average
     bt_case c = basin();
     bt_field f = made(&c);
@@ -627,9 +606,8 @@ static void assert_refused(const bt_case *c, bt_status want, const char *part)
     bt_field_free(&f);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
-    (void)state;
     bt_case c = basin();
     c.domain.length = c.ice.x_max = 8, c.ice.shape = BT_ICE_POLYGONS, c.ice.sides = 5, c.ice.concentration = 0.95;
     assert_refused(&c, BT_ERR_CASE, "cannot pack regular polygons to 0.95 in this region; ask for at most about 0.");
@@ -649,9 +627,8 @@ static void test_refusals(void **state)
     assert_refused(&c, BT_ERR_CASE, "ice.size_min");
 }
 
-static void test_add(void **state)
+TEST(test_add)
 {
-    (void)state;
     // a square given off its centroid and turned: the floe lies where its vertices were
     bt_field f;
     bt_field_init(&f);
@@ -675,9 +652,8 @@ static void yield_at_once(const bt_law_contact *t, double load[2], double given[
 }
 
 /// What a program adds acts on what is towed through the ice, and not on how the ice is made.
-static void test_laws_of_a_program(void **state)
+TEST(test_laws_of_a_program)
 {
-    (void)state;
     static const bt_force_law law = {.name = "push", .doc = "a push that never ends", .add = push};
     static const bt_contact_law contact = {
         .name = "soft", .doc = "contacts that bear next to nothing", .on = always, .bound = yield_at_once};
@@ -696,14 +672,5 @@ static void test_laws_of_a_program(void **state)
 int main(void)
 {
     omp_set_num_threads(1); // small fields: threads that wait for one another only cost
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_add),         cmocka_unit_test(test_voronoi),
-        cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),  cmocka_unit_test(test_surroundings),
-        cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
-        cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),   cmocka_unit_test(test_orientation),
-        cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_laws_of_a_program),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Ice field files: what is written is read back to the bit, and no damaged file gets in or crashes the reader.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 #include <hdf5.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "test.h"
 #include "base/checksum.h"
 #include "bergtow/field.h"
 #include "bergtow/shape.h"
@@ -91,9 +82,8 @@ static void assert_refused(bt_status want, const char *part)
     bt_field_free(&f);
 }
 
-static void test_round_trip(void **state)
+TEST(test_round_trip)
 {
-    (void)state;
     bt_field f = row(), g;
     write_row();
     bt_errors err = {0};
@@ -119,9 +109,8 @@ static void test_round_trip(void **state)
     bt_field_free(&f);
 }
 
-static void test_write_failure(void **state)
+TEST(test_write_failure)
 {
-    (void)state;
     bt_field f = row();
     bt_errors err = {0};
     assert_int_equal(bt_field_write(&f, &the_case, "/nowhere/at/all.h5", &err), BT_ERR_IO);
@@ -161,9 +150,8 @@ static void write_bare(void)
     free(bytes);
 }
 
-static void test_not_a_field(void **state)
+TEST(test_not_a_field)
 {
-    (void)state;
     remove(path);
     assert_refused(BT_ERR_IO, "No such file");
     write_bytes("", 0);
@@ -191,9 +179,8 @@ static void refuse_truncated(void)
     free(bytes);
 }
 
-static void test_truncated(void **state)
+TEST(test_truncated)
 {
-    (void)state;
     write_row();
     refuse_truncated();
     write_bare();
@@ -208,9 +195,8 @@ static uint64_t next_random(void)
 }
 
 /// Of a protected by a checksum file every flip is refused, wherever it is: checksum, metadata, numbers.
-static void test_flipped_bits_of_a_sealed_file(void **state)
+TEST(test_flipped_bits_of_a_sealed_file)
 {
-    (void)state;
     write_row();
     size_t n;
     char *bytes = read_bytes(&n);
@@ -232,9 +218,8 @@ static void test_flipped_bits_of_a_sealed_file(void **state)
     free(bytes);
 }
 
-static void test_flipped_bits_of_a_bare_file(void **state)
+TEST(test_flipped_bits_of_a_bare_file)
 {
-    (void)state;
     write_bare();
     size_t n;
     char *bytes = read_bytes(&n);
@@ -298,9 +283,8 @@ static void replace(const char *dataset, hid_t type, int rank, const hsize_t *di
     H5Fclose(file);
 }
 
-static void test_spoiled_values(void **state)
+TEST(test_spoiled_values)
 {
-    (void)state;
     spoil("/floes/vertices", 7, NAN);
     assert_refused(BT_ERR_CASE, "floe 1: its outline is refused: a vertex is not a finite number");
     spoil("/floes/vertices", 6, -5);
@@ -327,9 +311,8 @@ static void test_spoiled_values(void **state)
     assert_refused(BT_ERR_CASE, "/floes/vertices: has 25 rows, the offsets end at 24");
 }
 
-static void test_spoiled_layout(void **state)
+TEST(test_spoiled_layout)
 {
-    (void)state;
     const hsize_t five[] = {5}, twentyfive[] = {25, 3}, huge[] = {(hsize_t)1 << 50}, none[] = {0};
     const double numbers[75] = {0};
     const char letters[5] = "abcd";
@@ -378,17 +361,4 @@ static void test_spoiled_layout(void **state)
     assert_refused(BT_ERR_CASE, "attribute ice_area");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_write_failure),
-        cmocka_unit_test(test_not_a_field),
-        cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_flipped_bits_of_a_sealed_file),
-        cmocka_unit_test(test_flipped_bits_of_a_bare_file),
-        cmocka_unit_test(test_spoiled_values),
-        cmocka_unit_test(test_spoiled_layout),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Fields kept for other runs: the same bits, under a name that holds all they follow from, and never a damaged one.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "test.h"
 #include "field/field_kept.h"
 #include "base/fileio.h"
 #include "case/schema.h"
@@ -93,9 +84,8 @@ static char *path_of(const bt_case *c)
     return bt_file_join(kept, name);
 }
 
-static void test_the_same_bits_and_no_second_making(void **state)
+TEST(test_the_same_bits_and_no_second_making)
 {
-    (void)state;
     bt_case c = case_with("ice.extent.y_max=500 m");
     bt_field made = field_of(NULL, &c), first = field_of(kept, &c);
     char *path = path_of(&c);
@@ -115,9 +105,8 @@ static void test_the_same_bits_and_no_second_making(void **state)
 }
 
 /// Every byte counts, a missing end, and the field of another case under this name.
-static void test_what_is_damaged_is_made_anew(void **state)
+TEST(test_what_is_damaged_is_made_anew)
 {
-    (void)state;
     bt_case c = case_with(NULL), other = case_with("ice.seed=8");
     bt_field made = field_of(kept, &c), foreign = field_of(kept, &other);
     char *path = path_of(&c), *strange = path_of(&other), *whole, *wrong, *again;
@@ -155,9 +144,8 @@ static void digest_with(const char *set, char digest[BT_CHECKSUM_DIGEST])
     bt_case_free(&c);
 }
 
-static void test_what_a_field_follows_from_is_in_its_name(void **state)
+TEST(test_what_a_field_follows_from_is_in_its_name)
 {
-    (void)state;
     static const char *const counts[] = {
         "ice.concentration=0.61", "ice.size=31 m", "ice.seed=8", "ice.shake=4", "ice.thickness=1.1 m",
         "ice.thickness_spread=0.2", "ice.shape=rectangles", "ice.size_spread=0.3", "ice.x_min=10 m",
@@ -174,9 +162,8 @@ static void test_what_a_field_follows_from_is_in_its_name(void **state)
 }
 
 /// And what is left out of the name changes no bit of the ice.
-static void test_what_is_not_in_the_name_changes_nothing(void **state)
+TEST(test_what_is_not_in_the_name_changes_nothing)
 {
-    (void)state;
     static const char *const idle[] = {
         "run.dt=0.5 s", "run.duration=30 s", "tow.speed=0.4 m/s", "water.latitude=75 deg", "ice.friction=0.1",
         "ice.restitution=0.2", "ice.density=850 kg/m3", "ice.added_mass=0.2", "ice.added_inertia=0.2",
@@ -204,13 +191,4 @@ static void test_what_is_not_in_the_name_changes_nothing(void **state)
     bt_case_free(&c);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_the_same_bits_and_no_second_making),
-        cmocka_unit_test(test_what_is_damaged_is_made_anew),
-        cmocka_unit_test(test_what_a_field_follows_from_is_in_its_name),
-        cmocka_unit_test(test_what_is_not_in_the_name_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_MAIN(make_folder, remove_folder)

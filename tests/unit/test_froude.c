@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The Froude-scaled twin: exponents from dimensions, every key, exceptions, and the way back.
+#include "test.h"
 #include "bergtow/case.h"
 #include "case/schema.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 // Exponents of kg, m and s in the SI unit of a kind: L³ for mass, L for length, L^½ for time.
-static void exponents_follow_from_the_dimensions(void **state)
+TEST(exponents_follow_from_the_dimensions)
 {
-    (void)state;
     static const struct {
         const char *symbol;
         double kg, m, s;
@@ -64,9 +56,8 @@ static const char ship[] =
     "floes: [{x: 20, y: 1, length: 0.7, vx: 0.1, yaw: 30}, {x: 30, y: -2, shape: polygon, vertices: "
     "[[0,0],[1,0],[0,1]], thickness: 0.02}]\n";
 
-static void each_value_by_its_dimension(void **state)
+TEST(each_value_by_its_dimension)
 {
-    (void)state;
     bt_case a, b;
     bt_errors err = {0};
     read_case(&a, ship, BT_OK);
@@ -94,9 +85,8 @@ static void each_value_by_its_dimension(void **state)
     bt_case_free(&b);
 }
 
-static void the_way_back_returns_every_value(void **state)
+TEST(the_way_back_returns_every_value)
 {
-    (void)state;
     static const double ratios[] = {4, 30, 1.0 / 17, 0.37};
     for (int r = 0; r < 4; r++) {
         bt_case a, b;
@@ -120,9 +110,8 @@ static void the_way_back_returns_every_value(void **state)
     }
 }
 
-static void a_window_to_be_found_stays_so(void **state)
+TEST(a_window_to_be_found_stays_so)
 {
-    (void)state;
     bt_case c;
     bt_errors err = {0};
     read_case(&c, "run: {dt: 0.1, duration: 100}\n", BT_OK);
@@ -131,9 +120,8 @@ static void a_window_to_be_found_stays_so(void **state)
     bt_case_free(&c);
 }
 
-static void refuses_what_cannot_be_scaled(void **state)
+TEST(refuses_what_cannot_be_scaled)
 {
-    (void)state;
     static const struct {
         const char *text;
         double ratio;
@@ -156,14 +144,4 @@ static void refuses_what_cannot_be_scaled(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exponents_follow_from_the_dimensions),
-        cmocka_unit_test(each_value_by_its_dimension),
-        cmocka_unit_test(the_way_back_returns_every_value),
-        cmocka_unit_test(a_window_to_be_found_stays_so),
-        cmocka_unit_test(refuses_what_cannot_be_scaled),
-    };
-    return cmocka_run_group_tests_name("froude", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

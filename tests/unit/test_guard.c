@@ -3,8 +3,6 @@
 // every number is looked at; the scale of the energy bounds what wind, current, tide and slope can do.
 #include "scene.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 #include "bergtow/run.h"
@@ -75,9 +73,8 @@ static void expect(bt_guard *g, bt_world *w, const bt_sample *s, const char *par
     expect_of(g, w, s, false, part);
 }
 
-static void guards_fire_at_their_limits(void **state)
+TEST(guards_fire_at_their_limits)
 {
-    (void)state;
     bt_case c = a_case();
     bt_world *w = two_floes();
     bt_guard g = {0};
@@ -124,9 +121,8 @@ static void guards_fire_at_their_limits(void **state)
     bt_world_free(w);
 }
 
-static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **state)
+TEST(a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end)
 {
-    (void)state;
     bt_case c = a_case();
     bt_world *w = two_floes();
     bt_guard g = {0};
@@ -194,9 +190,8 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     bt_world_free(w);
 }
 
-static void numbers_that_are_none_are_found_in_bodies(void **state)
+TEST(numbers_that_are_none_are_found_in_bodies)
 {
-    (void)state;
     const bt_case c = a_case();
     bt_world *w = two_floes();
     bt_guard g = {0};
@@ -238,9 +233,8 @@ static bt_world *whole_scene(bt_case *c, bt_roster *r)
     return w;
 }
 
-static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **state)
+TEST(numbers_that_are_none_are_found_in_tow_window_and_collisions)
 {
-    (void)state;
     bt_case c;
     bt_roster r;
     bt_world *w = whole_scene(&c, &r);
@@ -285,9 +279,8 @@ static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **
 }
 
 /// Every number of a sample: none where it applies is a fault, and one where it does not.
-static void numbers_that_are_none_are_found_in_samples(void **state)
+TEST(numbers_that_are_none_are_found_in_samples)
 {
-    (void)state;
     bt_case c;
     bt_roster r;
     bt_world *w = whole_scene(&c, &r), *bare = two_floes();
@@ -332,9 +325,8 @@ static double draw(uint64_t *state, double low, double high)
 
 /// A floe alone under wind, current, tide and slope, from rest or not: with guard.energy 1 the limit is what the
 /// derivation says, and every step stays below.
-static void no_floe_is_driven_beyond_the_scale(void **state)
+TEST(no_floe_is_driven_beyond_the_scale)
 {
-    (void)state;
     uint64_t seed = 1;
     double closest = 0;
     for (int scene = 0; scene < 400; scene++) {
@@ -404,9 +396,8 @@ static void add_stream(const bt_force_body *b, bt_load *l)
 }
 
 /// Nor by a law that draws it along, in water and air at rest.
-static void no_floe_is_drawn_beyond_the_scale(void **state)
+TEST(no_floe_is_drawn_beyond_the_scale)
 {
-    (void)state;
     static const bt_force_law law = {.name = "stream", .doc = "drawn along", .add = add_stream};
     bt_errors err = {0};
     assert_int_equal(bt_force_register(&law, &err), BT_OK);
@@ -445,9 +436,8 @@ static void no_floe_is_drawn_beyond_the_scale(void **state)
 }
 
 /// The limit of a run that goes on is that of its start: red when it is taken anew, once the law draws no longer.
-static void the_limit_of_energy_goes_on(void **state)
+TEST(the_limit_of_energy_goes_on)
 {
-    (void)state;
     static const char *const text =
         "run: {dt: 0.1 s, duration: 2 s}\ndomain: {length: 100 m, width: 100 m, ends: open, sides: open}\n"
         "ice: {concentration: 0, size: 1 m, thickness: 0.1 m}\nbody: {shape: none}\ntow: {mode: none}\n"
@@ -472,9 +462,8 @@ static void the_limit_of_energy_goes_on(void **state)
 // --- the last state --------------------------------------------------------------------------------------------------
 
 /// What the last look finds is what the next step finds, and the state stays as it was.
-static void overlap_of_the_last_state_is_that_of_the_next_step(void **state)
+TEST(overlap_of_the_last_state_is_that_of_the_next_step)
 {
-    (void)state;
     for (int crush = 0; crush < 2; crush++) {
         double deepest = 0;
         bt_params p = scene_params(0.1, 1);
@@ -508,18 +497,4 @@ static void overlap_of_the_last_state_is_that_of_the_next_step(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(guards_fire_at_their_limits),
-        cmocka_unit_test(a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end),
-        cmocka_unit_test(numbers_that_are_none_are_found_in_bodies),
-        cmocka_unit_test(numbers_that_are_none_are_found_in_tow_window_and_collisions),
-        cmocka_unit_test(numbers_that_are_none_are_found_in_samples),
-        cmocka_unit_test(no_floe_is_driven_beyond_the_scale),
-        cmocka_unit_test(no_floe_is_drawn_beyond_the_scale),
-        cmocka_unit_test(the_limit_of_energy_goes_on),
-        cmocka_unit_test(overlap_of_the_last_state_is_that_of_the_next_step),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

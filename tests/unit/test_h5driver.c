@@ -2,17 +2,11 @@
 // The HDF5 file driver: what a file under way holds when its writer is killed between any two writes.
 #include <errno.h>
 #include <hdf5.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
 
 #include "base/fileio.h"
 #include "base/h5util.h"
@@ -119,9 +113,8 @@ static int note_of(hid_t file)
 
 // Red: metadata that are written as HDF5 hands them over, or lowest address first: rows announced before their index is
 // there.
-static void killed_at_any_write_it_holds_whole_rows(void **state)
+TEST(killed_at_any_write_it_holds_whole_rows)
 {
-    (void)state;
     char path[] = "/tmp/bt_h5driver_XXXXXX";
     close(mkstemp(path));
     const long writes = write_file(path, -1);
@@ -230,9 +223,8 @@ static void shuffle(hid_t access, const char *path, uint64_t seed_given, hsize_t
 }
 
 // Red: what waits not seen by a read, written over data that took its place, or written beyond the end of the file.
-static void a_file_of_many_changes_is_whole(void **state)
+TEST(a_file_of_many_changes_is_whole)
 {
-    (void)state;
     char ours[] = "/tmp/bt_h5driver_XXXXXX", theirs[] = "/tmp/bt_h5driver_XXXXXX";
     close(mkstemp(ours));
     close(mkstemp(theirs));
@@ -311,9 +303,8 @@ static void check_flush(H5FD_t *file, plain_file *m)
 
 // Red: a run that goes over a gap, over the end of the last flush, or from an index to a header; what waits not seen by
 // a read, or seen after data took its place.
-static void every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte(void **state)
+TEST(every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte)
 {
-    (void)state;
     char path[] = "/tmp/bt_h5driver_XXXXXX";
     close(mkstemp(path));
     static plain_file m;
@@ -355,9 +346,8 @@ static void every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte(void 
 }
 
 /// The system may write less than it was given: what is left follows, at its place.
-static void a_write_cut_short_goes_on(void **state)
+TEST(a_write_cut_short_goes_on)
 {
-    (void)state;
     char bytes[1000], back[1016] = {0}, name[] = "/tmp/bergtow-short-XXXXXX";
     for (size_t k = 0; k < sizeof bytes; k++) bytes[k] = (char)(k % 251);
     const int fd = mkstemp(name);
@@ -373,9 +363,8 @@ static void a_write_cut_short_goes_on(void **state)
 }
 
 /// Where a text cannot have its name, because a folder has it, nothing is left under the temporary one.
-static void a_text_that_fails_leaves_nothing(void **state)
+TEST(a_text_that_fails_leaves_nothing)
 {
-    (void)state;
     char folder[] = "/tmp/bergtow-text-XXXXXX", path[64], part[80];
     bt_errors err = {0};
     assert_non_null(mkdtemp(folder));
@@ -389,13 +378,4 @@ static void a_text_that_fails_leaves_nothing(void **state)
     bt_errors_free(&err);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows),
-                                       cmocka_unit_test(a_write_cut_short_goes_on),
-                                       cmocka_unit_test(a_text_that_fails_leaves_nothing),
-                                       cmocka_unit_test(a_file_of_many_changes_is_whole),
-                                       cmocka_unit_test(
-                                           every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

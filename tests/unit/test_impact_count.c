@@ -55,9 +55,8 @@ static bool alike(const bt_panel_loads *a, const bt_panel_loads *b)
 
 /// Runs before and after the first and the second time that two blocks become one, and such that end within a block:
 /// from any start that the window may have, and from a state that was kept on the way.
-static void panel_loads_from_any_start(void **state)
+TEST(panel_loads_from_any_start)
 {
-    (void)state;
     const int64_t full = 5 * BT_STATS_STARTS, early = 17,
                   late[] = {0, 1, 4, 5, 23, full, full + 1, full + 13, 2 * full, 2 * full + 1, 3 * full + 7};
     const int64_t lengths[] = {5, 5, 5, 5, 5, 5, 10, 10, 10, 20, 20};
@@ -90,9 +89,8 @@ static void panel_loads_from_any_start(void **state)
 }
 
 /// A collision at the very start of the window is in it, one a step before is not; the history gives what is of steps.
-static void collisions_by_their_time(void **state)
+TEST(collisions_by_their_time)
 {
-    (void)state;
     enum { N = 10 };
     double column[N], push[N] = {9, 1, 30, 2, 3, 7, 4, 5, 6, 1}, share[N] = {50, 50, 50, 50, 1, 2, 3, 4, 5, 6};
     for (int i = 0; i < N; i++) column[i] = i + 1;
@@ -141,9 +139,8 @@ static void collisions_by_their_time(void **state)
 }
 
 /// More peaks than are kept: the largest are.
-static void the_largest_peaks_are_kept(void **state)
+TEST(the_largest_peaks_are_kept)
 {
-    (void)state;
     const bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 1}, .dt = 1, .panels = {.n = 1}};
     double one = 1;
     bt_history h = {.n = 1};
@@ -229,9 +226,8 @@ static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
 
 /// More collisions than are read back at once, and one that is open until the record ends: all of result.h5 is counted,
 /// once.
-static void every_row_of_the_file_is_counted(void **state)
+TEST(every_row_of_the_file_is_counted)
 {
-    (void)state;
     scene k;
     begin(&k);
     bt_errors err = {0};
@@ -245,9 +241,8 @@ static void every_row_of_the_file_is_counted(void **state)
 }
 
 /// The same, taken up before the window begins and within it; and what no step can have left is refused.
-static void a_record_that_goes_on_counts_the_same(void **state)
+TEST(a_record_that_goes_on_counts_the_same)
 {
-    (void)state;
     const struct { int at; const char *dir, *name; double panel, time, load;
     } all[] = {{31, "early", NULL, 1, 1, 1},
                {120, "late", NULL, 1, 1, 1},
@@ -301,14 +296,5 @@ static void a_record_that_goes_on_counts_the_same(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(panel_loads_from_any_start),
-        cmocka_unit_test(collisions_by_their_time),
-        cmocka_unit_test(the_largest_peaks_are_kept),
-        cmocka_unit_test(every_row_of_the_file_is_counted),
-        cmocka_unit_test(a_record_that_goes_on_counts_the_same),
-    };
-    int failed;
-    RUN_IN_FOLDER(tests, failed);
-    return failed;
+    return run_in_folder();
 }

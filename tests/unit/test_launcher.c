@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Launchers as the environment tells of them, and the cores of a process.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-// cmocka.h wants the headers above first
-#include <cmocka.h>
-
+#include "test.h"
 #include "base/process.h"
 
 extern char **environ;
@@ -31,9 +23,8 @@ static void expect(bt_launcher by, bool found, bool first, int size)
     assert_int_equal(by.size, size);
 }
 
-static void every_launcher_is_known(void **state)
+TEST(every_launcher_is_known)
 {
-    (void)state;
     expect(IN("OMPI_COMM_WORLD_RANK=1", "OMPI_COMM_WORLD_SIZE=4", "PMIX_RANK=1"), true, false, 4);
     expect(IN("PMI_RANK=0", "PMI_SIZE=3", "PMI_FD=5"), true, true, 3);
     expect(IN("PMI_ID=0", "PMI_PORT=host:1"), true, true, 0);
@@ -46,9 +37,8 @@ static void every_launcher_is_known(void **state)
     expect(IN("SLURM_PROCID=0", "SLURM_STEP_NUM_TASKS=2"), true, true, 2);
 }
 
-static void nobody_has_launched_it(void **state)
+TEST(nobody_has_launched_it)
 {
-    (void)state;
     expect(IN("HOME=/root"), false, false, 0);
     expect(IN("SLURM_PROCID=0", "SLURM_NTASKS=8"), false, false, 0); // a job script
     expect(IN("SLURM_PROCID=0", "SLURM_STEP_NUM_TASKS=1"), false, false, 0);
@@ -57,9 +47,8 @@ static void nobody_has_launched_it(void **state)
 }
 
 /// What a rank starts is told of no launcher, and of all else.
-static void none_is_known_once_it_is_forgotten(void **state)
+TEST(none_is_known_once_it_is_forgotten)
 {
-    (void)state;
     char *variables[] = {"OMPI_COMM_WORLD_RANK=0", "OMPI_COMM_WORLD_SIZE=1", "PMI_RANK=0", "PMI_SIZE=1", "PMI_ID=0",
                          "MV2_COMM_WORLD_RANK=0", "MV2_COMM_WORLD_SIZE=1", "JSM_NAMESPACE_RANK=0",
                          "JSM_NAMESPACE_SIZE=1", "HOME=/root", "FLUX_TASK_RANK=0", "FLUX_JOB_SIZE=1", "PALS_RANKID=0",
@@ -75,17 +64,15 @@ static void none_is_known_once_it_is_forgotten(void **state)
 }
 
 // mpirun of a job has started its servers, one a node, with srun.
-static void the_innermost_launcher_counts(void **state)
+TEST(the_innermost_launcher_counts)
 {
-    (void)state;
     expect(IN("SLURM_PROCID=0", "SLURM_STEP_NUM_TASKS=2", "PMI_RANK=5", "PMI_SIZE=8"), true, false, 8);
     expect(IN("SLURM_PROCID=0", "SLURM_STEP_NUM_TASKS=2", "OMPI_COMM_WORLD_RANK=1", "OMPI_COMM_WORLD_SIZE=1"), true,
            false, 1);
 }
 
-static void cores_are_those_that_were_given(void **state)
+TEST(cores_are_those_that_were_given)
 {
-    (void)state;
     unsetenv("SLURM_CPUS_PER_TASK");
     cpu_set_t before, one, seen;
     assert_int_equal(sched_getaffinity(0, sizeof before, &before), 0);
@@ -102,14 +89,4 @@ static void cores_are_those_that_were_given(void **state)
     unsetenv("SLURM_CPUS_PER_TASK");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_launcher_is_known),
-        cmocka_unit_test(nobody_has_launched_it),
-        cmocka_unit_test(none_is_known_once_it_is_forgotten),
-        cmocka_unit_test(the_innermost_launcher_counts),
-        cmocka_unit_test(cores_are_those_that_were_given),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,16 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The lead in a field: which floes it takes, and what their pieces must be. Overlap with the strip is found here by
 // clipping, not by the separating axes that the program uses.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-// cmocka.h wants the five above first
-#include <cmocka.h>
-
+#include "test.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "bergtow/shape.h"
@@ -89,9 +80,8 @@ static bool same_floe(const bt_field *f, bt_idx i, const bt_field *g, bt_idx j)
 
 static const double bend[] = {3, -4, 18, 2, 22, -6, 36, -5};
 
-static void channel_takes_what_it_overlaps(void **state)
+TEST(channel_takes_what_it_overlaps)
 {
-    (void)state;
     const bt_lead l = {.mode = BT_LEAD_CHANNEL, .width = 3, .n = 4, .path = bend};
     bt_field f, before;
     make_field(&f, BT_BOUND_WALL);
@@ -154,9 +144,8 @@ static double worst_overlap(const bt_field *f)
     return worst;
 }
 
-static void managed_pieces_are_small_and_keep_the_mass(void **state)
+TEST(managed_pieces_are_small_and_keep_the_mass)
 {
-    (void)state;
     const bt_lead l = {.mode = BT_LEAD_MANAGED, .width = 3, .floe_size = 0.8, .n = 4, .path = bend};
     const double largest = BT_PI / 4 * 0.64;
     bt_field f, before;
@@ -206,9 +195,8 @@ static void managed_pieces_are_small_and_keep_the_mass(void **state)
 }
 
 /// In a periodic domain the strip goes on at the other end, as often as it is long, and pieces stay in the domain.
-static void a_lead_goes_over_the_seam(void **state)
+TEST(a_lead_goes_over_the_seam)
 {
-    (void)state;
     const double path[] = {30, 0, 30 + 60, 0}; // to x = 10 of the next period but one: the whole width of the domain
     for (int managed = 0; managed < 2; managed++) {
         const bt_lead l = {.mode = managed ? BT_LEAD_MANAGED : BT_LEAD_CHANNEL,
@@ -235,9 +223,8 @@ static void a_lead_goes_over_the_seam(void **state)
 }
 
 /// Of a field file that does not say where its ice region is, nobody knows the concentration after a lead.
-static void an_unnamed_region_leaves_the_concentration_unknown(void **state)
+TEST(an_unnamed_region_leaves_the_concentration_unknown)
 {
-    (void)state;
     bt_case c;
     bt_case_defaults(&c);
     c.domain.length = 40, c.domain.width = 20, c.domain.y0 = -10;
@@ -260,9 +247,8 @@ static void an_unnamed_region_leaves_the_concentration_unknown(void **state)
     bt_case_free(&c);
 }
 
-static void too_many_pieces_are_refused(void **state)
+TEST(too_many_pieces_are_refused)
 {
-    (void)state;
     const bt_lead l = {.name = "a.yml", .mode = BT_LEAD_MANAGED, .width = 3, .floe_size = 1e-4, .n = 4, .path = bend};
     bt_field f;
     make_field(&f, BT_BOUND_WALL);
@@ -277,14 +263,4 @@ static void too_many_pieces_are_refused(void **state)
     bt_field_free(&f);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(channel_takes_what_it_overlaps),
-        cmocka_unit_test(managed_pieces_are_small_and_keep_the_mass),
-        cmocka_unit_test(a_lead_goes_over_the_seam),
-        cmocka_unit_test(an_unnamed_region_leaves_the_concentration_unknown),
-        cmocka_unit_test(too_many_pieces_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

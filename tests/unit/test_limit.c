@@ -25,9 +25,8 @@ static bt_contact random_contact(uint64_t *rng, int n)
 
 /// After the update: 0 <= λ; w >= 0 below the bound; w <= 0 above zero; λ on its bound L(w) where w < 0. A point with a
 /// rising bound is exact when alone, a pair in the limit of many updates.
-static void the_law_of_one_manifold(void **state)
+TEST(the_law_of_one_manifold)
 {
-    (void)state;
     uint64_t rng = 3;
     int bound = 0, held = 0, open = 0, rising = 0;
     for (int k = 0; k < 20000; k++) {
@@ -83,9 +82,8 @@ static double reach(const bt_limit *l, double x, double y)
 
 /// Sheets: at the end of many updates the load is one that they can bear, no farther in any direction than friction
 /// and ends reach there, and takes all the power that these allow; or nothing slides.
-static void the_law_of_sheets(void **state)
+TEST(the_law_of_sheets)
 {
-    (void)state;
     uint64_t rng = 5;
     int slides = 0, sticks = 0;
     for (int k = 0; k < 5000; k++) {
@@ -124,9 +122,8 @@ static void the_law_of_sheets(void **state)
 }
 
 /// Without a bound it is the rigid update, bit for bit but for the order of operations.
-static void no_bound_is_rigid(void **state)
+TEST(no_bound_is_rigid)
 {
-    (void)state;
     uint64_t rng = 8;
     for (int k = 0; k < 2000; k++) {
         const bt_inv inv[2] = {{1, 3}, {0.5, 0.7}};
@@ -145,9 +142,8 @@ static void no_bound_is_rigid(void **state)
 
 /// Windows of 1 m of asked path at 0.5 m/s: stands for 10 s, goes for 10 s, holds (asks for nothing), creeps at 4 % and
 /// at 6 %.
-static void stall_windows(void **state)
+TEST(stall_windows)
 {
-    (void)state;
     bt_stall s = {0};
     double x = 3;
     const struct {
@@ -168,9 +164,8 @@ static void stall_windows(void **state)
 
 /// The towing end passes through the hull twice, steps of half a second: how long in all, and from when on. Where it
 /// begins within, the first way out comes first; of a body adrift nothing counts.
-static void the_end_within_the_hull(void **state)
+TEST(the_end_within_the_hull)
 {
-    (void)state;
     static const double ahead[] = {0.2, 3, 0.9, 0, -0.9, -3, -0.9, 3};
     enum { STEPS = sizeof ahead / sizeof *ahead };
     for (int adrift = 0; adrift < 2; adrift++) {
@@ -196,9 +191,8 @@ static void the_end_within_the_hull(void **state)
 
 /// A bound whose impulse moves the bodies by less than the tolerance: what the impulse is short of it still counts by
 /// the speed that it leaves, until 1 % is left. Rows that close by less than the tolerance are as they should be.
-static void a_bound_below_the_tolerance_is_not_left_out(void **state)
+TEST(a_bound_below_the_tolerance_is_not_left_out)
 {
-    (void)state;
     const bt_inv inv[2] = {{1, 2}, {0, 0}};
     const double most = 1e-6;
     const bt_limit l = {.flat = {most, most}, .most = {most, most}, .place = {0, 0}};
@@ -216,9 +210,8 @@ static void a_bound_below_the_tolerance_is_not_left_out(void **state)
 }
 
 /// Neither a contact nor sheets: the largest of numbers passes over one that is none.
-static void a_velocity_that_is_no_number_is_not_solved(void **state)
+TEST(a_velocity_that_is_no_number_is_not_solved)
 {
-    (void)state;
     uint64_t rng = 5;
     const bt_inv inv[2] = {{1, 2}, {0.5, 1}};
     const bt_limit l = {.flat = {1, INFINITY}, .most = {1, INFINITY}};
@@ -235,14 +228,4 @@ static void a_velocity_that_is_no_number_is_not_solved(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(the_law_of_sheets),
-        cmocka_unit_test(a_bound_below_the_tolerance_is_not_left_out),
-        cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
-        cmocka_unit_test(the_end_within_the_hull),
-        cmocka_unit_test(a_velocity_that_is_no_number_is_not_solved),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -3,8 +3,6 @@
 // places.
 #include "scene.h"
 
-#include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "field/map_features.h"
@@ -111,9 +109,8 @@ static int check(const char *path, const char *text, size_t size)
 }
 
 // Red: a comma at the end of the list let through; depth not held against the type.
-static void as_the_tree_of_the_whole(void **state)
+TEST(as_the_tree_of_the_whole)
 {
-    (void)state;
     char path[] = "/tmp/bergtow_features_XXXXXX";
     close(mkstemp(path));
     const int rings[N_TEXTS] = {3};
@@ -138,9 +135,8 @@ static void as_the_tree_of_the_whole(void **state)
 
 // Red: the rest of the quotient left out (numbers just beyond the middle of two doubles go the wrong way), or its least
 // number of bits.
-static void numbers_are_rounded_as_strtod_does(void **state)
+TEST(numbers_are_rounded_as_strtod_does)
 {
-    (void)state;
     char path[] = "/tmp/bergtow_features_XXXXXX";
     close(mkstemp(path));
     static const char *const hard[] = {"9007199254740993.0",
@@ -193,9 +189,4 @@ static void numbers_are_rounded_as_strtod_does(void **state)
     unlink(path);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(as_the_tree_of_the_whole),
-                                       cmocka_unit_test(numbers_are_rounded_as_strtod_does)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

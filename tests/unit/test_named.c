@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The order of pairs by their names is that of qsort, for lists of every length.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-
-#include <cmocka.h>
-
+#include "test.h"
 #include "base/named.h"
 #include "base/rng.h"
 
@@ -21,9 +14,8 @@ static int by_names(const void *p, const void *q)
     return (a->part > b->part) - (a->part < b->part);
 }
 
-static void test_order(void **state)
+TEST(test_order)
 {
-    (void)state;
     bt_named mine[MOST], theirs[MOST], room[MOST];
     for (int n = 0; n < MOST; n++) {
         bt_rng r = bt_rng_start(1, BT_RNG_SHAKE, n);
@@ -44,8 +36,4 @@ static void test_order(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_order)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

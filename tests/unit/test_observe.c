@@ -8,9 +8,8 @@
 
 /// A square that stands on its corner slides along the flat side of the towed body, with friction. What the towed body
 /// feels is what the square loses, at the point of its corner; the bodies are added in either order.
-static void force_and_moment_on_the_towed_body(void **state)
+TEST(force_and_moment_on_the_towed_body)
 {
-    (void)state;
     for (int towed_first = 0; towed_first < 2; towed_first++) {
         const bt_params p = scene_params(0.1, 1);
         bt_world *w = bt_world_create(&p);
@@ -47,9 +46,8 @@ static void force_and_moment_on_the_towed_body(void **state)
 }
 
 /// Linear drag of the vessel is that of its speed through the water.
-static void vessel_in_a_current(void **state)
+TEST(vessel_in_a_current)
 {
-    (void)state;
     const bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     double v[8];
@@ -68,9 +66,8 @@ static void vessel_in_a_current(void **state)
 }
 
 /// Two squares that have rafted are drawn apart: friction of the sheets is spread over them, and no contact bears it.
-static void sheets_are_no_contact(void **state)
+TEST(sheets_are_no_contact)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 10);
     p.slop = 0.01;
     double *own = p.law_own[BT_LAW_RAFTING];
@@ -101,9 +98,8 @@ static void sheets_are_no_contact(void **state)
 
 /// Two squares that meet: what each has from the other is opposite, and the momentum it gained; the same where the
 /// second is a body that forces are taken of by its contacts. A velocity that is set afterwards is no force.
-static void net_forces_of_two(void **state)
+TEST(net_forces_of_two)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 10);
     bt_world *w = bt_world_create(&p);
     double v[8], force[2][2], by_contacts[2][2];
@@ -131,13 +127,4 @@ static void net_forces_of_two(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(force_and_moment_on_the_towed_body),
-        cmocka_unit_test(vessel_in_a_current),
-        cmocka_unit_test(sheets_are_no_contact),
-        cmocka_unit_test(net_forces_of_two),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -29,9 +29,8 @@ static bool inside(int n, const double *v, double x, double y)
     return in;
 }
 
-static void cleaning_keeps_the_corners(void **state)
+TEST(cleaning_keeps_the_corners)
 {
-    (void)state;
     // A square with double corners, points in the middle of sides, two in a row, and one that begins in the middle of a
     // side.
     double v[] = {0.5, 0, 1, 0, 1, 0, 1, 0.2, 1, 0.2, 1, 0.9, 1, 1, 0, 1, 0, 1, 0, 0.3, 0, 0};
@@ -44,9 +43,8 @@ static void cleaning_keeps_the_corners(void **state)
     assert_true(bt_outline_clean(4, line) < 4); // and no endless loop
 }
 
-static void faults(void **state)
+TEST(faults)
 {
-    (void)state;
     assert_null(bt_outline_fault(8, c_shape));
     assert_false(bt_outline_convex(8, c_shape));
     double reversed[16];
@@ -73,9 +71,8 @@ static void faults(void **state)
 }
 
 /// L of three unit squares: area 3, centroid (5/6, 5/6), polar moment by Steiner's theorem.
-static void moments_of_what_is_not_convex(void **state)
+TEST(moments_of_what_is_not_convex)
 {
-    (void)state;
     const double l[] = {0, 0, 2, 0, 2, 1, 1, 1, 1, 2, 0, 2};
     const bt_moments m = bt_shape_moments(6, l);
     CHECK_CLOSE(m.area, 3, 1e-14);
@@ -123,9 +120,8 @@ static void check_parts(int n, const double *v, const bt_parts *p, uint64_t *rng
     }
 }
 
-static void parts_fill_the_outline_once(void **state)
+TEST(parts_fill_the_outline_once)
 {
-    (void)state;
     uint64_t rng = 3;
     bt_parts p;
     assert_true(bt_outline_split(8, c_shape, &p));
@@ -155,9 +151,8 @@ static void parts_fill_the_outline_once(void **state)
 }
 
 /// 1 degree of latitude and of longitude at 60° N are 111.4 km and 55.8 km; across 180° it is the short way.
-static void projection_of_known_lengths(void **state)
+TEST(projection_of_known_lengths)
 {
-    (void)state;
     const double d = BT_PI / 180;
     double north, east;
     bt_outline_project(20 * d, 60.5 * d, 20 * d, 59.5 * d, &north, &east);
@@ -173,9 +168,8 @@ static void projection_of_known_lengths(void **state)
 
 /// There and back, at every latitude, across 180° and at the poles themselves; the way out is checked against geodesics
 /// elsewhere.
-static void the_inverse_of_the_projection(void **state)
+TEST(the_inverse_of_the_projection)
 {
-    (void)state;
     const double d = BT_PI / 180, latitude[] = {-90, -89.99, -60, 0, 45, 76.5, 89.9, 90},
                  longitude[] = {-180, -90, 0, 20, 179.99}, far[] = {0, 1e-3, 30, 5e3, 100e3};
     for (int i = 0; i < 8; i++)
@@ -193,15 +187,4 @@ static void the_inverse_of_the_projection(void **state)
                 }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_inverse_of_the_projection),
-        cmocka_unit_test(cleaning_keeps_the_corners),
-        cmocka_unit_test(faults),
-        cmocka_unit_test(moments_of_what_is_not_convex),
-        cmocka_unit_test(parts_fill_the_outline_once),
-        cmocka_unit_test(projection_of_known_lengths),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

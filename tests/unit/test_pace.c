@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Threads of a run on machines that are made up: idle, shared with others, shared for a while.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-// cmocka.h wants the headers above first
-#include <cmocka.h>
-
+#include "test.h"
 #include "run/pace.h"
 
 enum { MOST = 8 };
@@ -44,9 +35,8 @@ static bt_pace started(int threads)
     return p;
 }
 
-static void an_idle_machine_keeps_all_threads(void **state)
+TEST(an_idle_machine_keeps_all_threads)
 {
-    (void)state;
     bt_pace p = started(8);
     assert_true(fabs(work_on(&p, &idle, 100) - 600) < 1e-6); // not one trial
     p = started(8);
@@ -54,9 +44,8 @@ static void an_idle_machine_keeps_all_threads(void **state)
     assert_true(p.now == 8 || p.from == 8);
 }
 
-static void a_busy_machine_has_as_many_as_pay(void **state)
+TEST(a_busy_machine_has_as_many_as_pay)
 {
-    (void)state;
     bt_pace p = started(8);
     assert_true(work_on(&p, &full, 100) > 0.9 * 10);
     p = started(8);
@@ -65,9 +54,8 @@ static void a_busy_machine_has_as_many_as_pay(void **state)
     assert_true(work_on(&p, &full, 100) > 0.9 * 10);
 }
 
-static void threads_come_back_when_the_others_have_gone(void **state)
+TEST(threads_come_back_when_the_others_have_gone)
 {
-    (void)state;
     bt_pace p = started(8);
     work_on(&p, &full, 100);
     assert_true(p.now <= 2);
@@ -75,9 +63,8 @@ static void threads_come_back_when_the_others_have_gone(void **state)
     assert_int_equal(p.now, 8);
 }
 
-static void a_fixed_number_stays(void **state)
+TEST(a_fixed_number_stays)
 {
-    (void)state;
     bt_pace p;
     bt_pace_begin(&p, 8, false);
     work_on(&p, &full, 10);
@@ -87,13 +74,4 @@ static void a_fixed_number_stays(void **state)
     assert_int_equal(p.now, 1);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_idle_machine_keeps_all_threads),
-        cmocka_unit_test(a_busy_machine_has_as_many_as_pay),
-        cmocka_unit_test(threads_come_back_when_the_others_have_gone),
-        cmocka_unit_test(a_fixed_number_stays),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,15 +1,7 @@
 // SPDX-License-Identifier: MIT
 // When the packed ice reaches the wall ahead: the balance of area by hand, every way the tow can go, and where nothing
 // is said.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
+#include "test.h"
 #include "estimate/packing.h"
 
 /// A body of 4 x 2 m that is towed at 0.5 m/s along x from (10, 0), in a closed domain of 100 x 20 m.
@@ -31,9 +23,8 @@ static bt_case closed(void)
     return c;
 }
 
-static void area_balances(void **state)
+TEST(area_balances)
 {
-    (void)state;
     bt_case c = closed();
     // 88 m ahead of the bow: front at 1 + (2/20) 0.8/0.1 = 1.8 of the body's way.
     bt_packing p = bt_packing_of(&c, 0.8);
@@ -66,9 +57,8 @@ static void area_balances(void **state)
     assert_float_equal(bt_packing_of(&c, 0.895).time, sqrt(20 * 88 / (1 + 0.1 * 0.895 / 0.005)), 1e-6);
 }
 
-static void towards_any_wall(void **state)
+TEST(towards_any_wall)
 {
-    (void)state;
     bt_case c = closed();
     c.tow.direction = BT_PI;
     assert_float_equal(bt_packing_of(&c, 0.8).way, 8 / 1.8, 1e-9);
@@ -87,9 +77,8 @@ static void towards_any_wall(void **state)
     assert_true(isnan(bt_packing_of(&c, 0.8).time));
 }
 
-static void where_nothing_is_said(void **state)
+TEST(where_nothing_is_said)
 {
-    (void)state;
     for (int k = 0; k < 8; k++) {
         bt_case c = closed();
         double point[] = {60, 0};
@@ -107,9 +96,8 @@ static void where_nothing_is_said(void **state)
     }
 }
 
-static void reported_from_the_earliest_time_on(void **state)
+TEST(reported_from_the_earliest_time_on)
 {
-    (void)state;
     const bt_packing p = {.time = 100, .way = 10, .packed = 0.9}, at_once = {.time = 0, .packed = 0.9};
     bt_errors w = {0};
     bt_packing_warn(&p, 100 * BT_PACKING_EARLY, &w);
@@ -123,13 +111,4 @@ static void reported_from_the_earliest_time_on(void **state)
     bt_errors_free(&w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(area_balances),
-        cmocka_unit_test(towards_any_wall),
-        cmocka_unit_test(where_nothing_is_said),
-        cmocka_unit_test(reported_from_the_earliest_time_on),
-    };
-    return cmocka_run_group_tests_name("packing", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

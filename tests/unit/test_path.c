@@ -19,9 +19,8 @@ static double length_of(const bt_path *p, double way, double step)
 
 /// Legs, arcs and marks of a right turn, a left turn and a straight end; the tangent is continuous where corners are
 /// round.
-static void paths_have_the_lengths_of_their_legs_and_arcs(void **state)
+TEST(paths_have_the_lengths_of_their_legs_and_arcs)
 {
-    (void)state;
     const double points[] = {100, 0, 100, 50, 200, 50};
     char why[200] = "";
     bt_path p;
@@ -71,8 +70,4 @@ static void paths_have_the_lengths_of_their_legs_and_arcs(void **state)
     assert_false(bt_path_make(&p, 0, 0, 2, (double[]){10, 0, 5, 0}, 1, why)); // back on itself
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(paths_have_the_lengths_of_their_legs_and_arcs)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -2,8 +2,8 @@
 // A pass over the cells: what each body meets, that cells done at once share no body, and who does what.
 #include <omp.h>
 #include <stdatomic.h>
-#include <stdlib.h>
 
+#include "test.h"
 #include "space/exchange.h"
 #include "space/phases.h"
 #include "all_pairs.h"
@@ -182,9 +182,8 @@ static const scene scenes[] = {
 };
 enum { N_SCENES = sizeof scenes / sizeof *scenes };
 
-static void every_body_meets_its_cells_in_order(void **state)
+TEST(every_body_meets_its_cells_in_order)
 {
-    (void)state;
     uint64_t rng = 11;
     for (int f = 0; f < N_SCENES; f++)
         for (int threads = 1; threads <= 4; threads++) {
@@ -202,9 +201,8 @@ static void every_body_meets_its_cells_in_order(void **state)
 
 /// The cells at the border of a rank come first in each phase, and what they do is sent when they are all done, however
 /// long one of them takes.
-static void the_border_is_done_before_it_is_sent(void **state)
+TEST(the_border_is_done_before_it_is_sent)
 {
-    (void)state;
     static const bt_exchange fake = {.send = send_phase, .receive = receive_phase};
     uint64_t rng = 5;
     for (int threads = 1; threads <= 4; threads++) {
@@ -228,9 +226,8 @@ static void the_border_is_done_before_it_is_sent(void **state)
 }
 
 /// Lists of all lengths: the shares are of listed contacts, and hold every cell once.
-static void shares_follow_the_lists(void **state)
+TEST(shares_follow_the_lists)
 {
-    (void)state;
     uint64_t rng = 3;
     for (int threads = 1; threads <= 3; threads++) {
         omp_set_num_threads(threads);
@@ -266,9 +263,8 @@ static void shares_follow_the_lists(void **state)
 }
 
 /// A team smaller than the number of shares: what nobody has is taken by those who are there.
-static void a_small_team_does_all(void **state)
+TEST(a_small_team_does_all)
 {
-    (void)state;
     uint64_t rng = 8;
     omp_set_num_threads(4);
     bt_world *w = fill(&(scene){30, 480, false, true, 0.5, 0.3}, &rng);
@@ -284,9 +280,8 @@ static void a_small_team_does_all(void **state)
 }
 
 /// Detection in a team of the caller, by a thread whose number is higher than the library's threads.
-static void a_team_of_the_caller_detects(void **state)
+TEST(a_team_of_the_caller_detects)
 {
-    (void)state;
     uint64_t rng = 8;
     bt_world *w = fill(&scenes[0], &rng);
     const bt_idx contacts = w->cells->n_contacts;
@@ -309,9 +304,8 @@ static void visit_busy(bt_world *w, bt_idx k, const void *visits, bt_totals *t)
     t->most2 = bt_max(t->most2, (double)k - w->cells->n);
 }
 
-static void every_busy_cell_is_visited_once(void **state)
+TEST(every_busy_cell_is_visited_once)
 {
-    (void)state;
     uint64_t rng = 9;
     for (int threads = 1; threads <= 4; threads++) {
         omp_set_num_threads(threads);
@@ -343,15 +337,4 @@ static void every_busy_cell_is_visited_once(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_body_meets_its_cells_in_order),
-        cmocka_unit_test(the_border_is_done_before_it_is_sent),
-        cmocka_unit_test(shares_follow_the_lists),
-        cmocka_unit_test(a_small_team_does_all),
-        cmocka_unit_test(a_team_of_the_caller_detects),
-        cmocka_unit_test(every_busy_cell_is_visited_once),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

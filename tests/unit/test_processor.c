@@ -2,14 +2,10 @@
 // On a processor without what the program was built for, it ends with a message and code 2; on any other it goes on.
 //
 // The check is compiled here as for SSE4.2 and BMI2, and asks a processor that lacks what `lacking` names.
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <cmocka.h>
+#include "test.h"
 
 static const char *lacking = "nothing";
 
@@ -44,9 +40,8 @@ static int check_on(const char *processor_lacks, char *said, size_t size)
     return WEXITSTATUS(status);
 }
 
-static void goes_on_where_nothing_is_missing(void **state)
+TEST(goes_on_where_nothing_is_missing)
 {
-    (void)state;
     char said[400];
     assert_int_equal(check_on("nothing", said, sizeof said), 7);
     assert_string_equal(said, "");
@@ -55,9 +50,8 @@ static void goes_on_where_nothing_is_missing(void **state)
 }
 
 #ifdef __x86_64__
-static void names_what_is_missing(void **state)
+TEST(names_what_is_missing)
 {
-    (void)state;
     char said[400];
     assert_int_equal(check_on("bmi2", said, sizeof said), BT_ERR_USAGE);
     assert_string_equal(said, "bergtow: built for processors with bmi2, which this one lacks; build it on this "
@@ -67,13 +61,4 @@ static void names_what_is_missing(void **state)
 }
 #endif
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(goes_on_where_nothing_is_missing),
-#ifdef __x86_64__
-        cmocka_unit_test(names_what_is_missing),
-#endif
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Progress lines against a clock of the test's own.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
+#include "test.h"
 #include "base/progress.h"
 
 static double now;
@@ -43,9 +35,8 @@ static int count(const char *text, char c)
     return n;
 }
 
-static void plain_lines_come_at_the_interval(void **state)
+TEST(plain_lines_come_at_the_interval)
 {
-    (void)state;
     const char *text = run((bt_progress){.interval = 10}, 0, 2);
     assert_int_equal(count(text, '\n'), 10);
     assert_int_equal(count(text, '\r'), 0);
@@ -55,36 +46,24 @@ static void plain_lines_come_at_the_interval(void **state)
     assert_non_null(strstr(text, " 25.0 %  t = 50 s  1 steps/s  5 min 00 s left  mean ice resistance so far 101 N\n"));
 }
 
-static void a_resumed_run_counts_its_own_steps(void **state)
+TEST(a_resumed_run_counts_its_own_steps)
 {
-    (void)state;
     const char *text = run((bt_progress){.interval = 100}, 200, NAN);
     assert_string_equal(text, " 75.0 %  t = 150 s  1 steps/s  1 min 40 s left\n"); // no force without a body
 }
 
-static void a_terminal_has_one_line(void **state)
+TEST(a_terminal_has_one_line)
 {
-    (void)state;
     const char *text = run((bt_progress){.interval = 1e9, .terminal = true}, 0, 1);
     assert_int_equal(count(text, '\n'), 0);
     assert_int_equal(count(text, '\r'), 101);
     assert_string_equal(strrchr(text, '\r'), "\r\x1b[K"); // left empty
 }
 
-static void quiet_is_quiet(void **state)
+TEST(quiet_is_quiet)
 {
-    (void)state;
     assert_string_equal(run((bt_progress){.interval = 0, .quiet = true}, 0, 1), "");
     assert_string_equal(run((bt_progress){.quiet = true, .terminal = true}, 0, 1), "");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(plain_lines_come_at_the_interval),
-        cmocka_unit_test(a_resumed_run_counts_its_own_steps),
-        cmocka_unit_test(a_terminal_has_one_line),
-        cmocka_unit_test(quiet_is_quiet),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -13,9 +13,8 @@ static double one_each(const bt_world *w, bt_idx floe, const void *context) { re
 
 #define SOUND .units = "N", .description = "a number of the test", .of_world = one
 
-static void what_will_not_do_is_refused(void **state)
+TEST(what_will_not_do_is_refused)
 {
-    (void)state;
     const struct { bt_quantity q; const char *says; } bad[] = {
         {{.name = "Big Name", SOUND}, "lower-case letters"},
         {{.name = "9th", SOUND}, "lower-case letters"},
@@ -83,9 +82,8 @@ static double by_hand(int k, double start)
     return five[k].keep == BT_KEEP_MEAN ? out / n : out;
 }
 
-static void reductions_are_those_of_the_window(void **state)
+TEST(reductions_are_those_of_the_window)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_case c = made_up_case();
     assert_int_equal(write_run(in_folder("a"), &c, STEPS, 3, &err), BT_OK);
@@ -104,9 +102,8 @@ static void reductions_are_those_of_the_window(void **state)
     bt_errors_free(&err);
 }
 
-static void a_key_that_the_summary_has_is_refused(void **state)
+TEST(a_key_that_the_summary_has_is_refused)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_quantity q = {.name = "size", .units = "m", .description = "its key is mean_size_m", .of_world = one,
                            .keep = BT_KEEP_MEAN};
@@ -119,15 +116,8 @@ static void a_key_that_the_summary_has_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_will_not_do_is_refused),
-        cmocka_unit_test(reductions_are_those_of_the_window),
-        cmocka_unit_test(a_key_that_the_summary_has_is_refused),
-    };
     bt_errors err = {0};
-    int failed;
     for (int k = 0; k < 5; k++) bt_quantity_register(&five[k], &err);
     if (err.n > 0) return 1;
-    RUN_IN_FOLDER(tests, failed);
-    return failed;
+    return run_in_folder();
 }

@@ -7,9 +7,8 @@
 #include "contact/law.h"
 #include "made_up_run.h"
 
-static void series_and_frames_come_back_to_the_bit(void **state)
+TEST(series_and_frames_come_back_to_the_bit)
 {
-    (void)state;
     enum { STEPS = 600, FRAMES = 3 };
     bt_errors err = {0};
     const bt_case c = made_up_case();
@@ -78,9 +77,8 @@ static void series_and_frames_come_back_to_the_bit(void **state)
     H5Fclose(f);
 }
 
-static void bodies_case_and_provenance_are_there(void **state)
+TEST(bodies_case_and_provenance_are_there)
 {
-    (void)state;
     const hid_t f = H5Fopen(in_folder("a/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     double x[VERTICES][2];
     int64_t o[BODIES + 1];
@@ -143,9 +141,8 @@ static void bodies_case_and_provenance_are_there(void **state)
     H5Fclose(f);
 }
 
-static void samples_merge_by_the_rule_of_their_field(void **state)
+TEST(samples_merge_by_the_rule_of_their_field)
 {
-    (void)state;
     bt_errors err = {0};
     bt_case c = made_up_case();
     c.output.sample_every = 4;
@@ -214,9 +211,8 @@ static herr_t same_object(hid_t f, const char *name, const H5O_info_t *info, voi
     return 0;
 }
 
-static void two_runs_have_the_same_datasets(void **state)
+TEST(two_runs_have_the_same_datasets)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_case c = made_up_case();
     assert_int_equal(write_run(in_folder("b"), &c, 600, 3, &err), BT_OK);
@@ -228,9 +224,8 @@ static void two_runs_have_the_same_datasets(void **state)
     H5Fclose(p.other);
 }
 
-static void an_empty_field_can_be_recorded(void **state)
+TEST(an_empty_field_can_be_recorded)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_case c = made_up_case();
     const int64_t o[2] = {0, 4};
@@ -256,9 +251,8 @@ static void an_empty_field_can_be_recorded(void **state)
     free(xdmf);
 }
 
-static void many_floes_are_packed(void **state)
+TEST(many_floes_are_packed)
 {
-    (void)state;
     enum { MANY = 3000 };
     static double v[4 * MANY][2], ones[MANY];
     static bt_frame_row rows[MANY];
@@ -309,15 +303,5 @@ int main(int argc, char **argv)
         bt_errors_print(&err);
         return status;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(series_and_frames_come_back_to_the_bit),
-        cmocka_unit_test(bodies_case_and_provenance_are_there),
-        cmocka_unit_test(samples_merge_by_the_rule_of_their_field),
-        cmocka_unit_test(two_runs_have_the_same_datasets),
-        cmocka_unit_test(an_empty_field_can_be_recorded),
-        cmocka_unit_test(many_floes_are_packed),
-    };
-    int failed;
-    RUN_IN_FOLDER(tests, failed);
-    return failed;
+    return run_in_folder();
 }

@@ -12,9 +12,8 @@
 
 static const char *self = "test_record_faults";
 
-static void a_failed_run_leaves_no_old_summary(void **state)
+TEST(a_failed_run_leaves_no_old_summary)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_case c = made_up_case();
     assert_int_equal(write_run(in_folder("again"), &c, 10, 0, &err), BT_OK);
@@ -77,9 +76,8 @@ static void check_killed(bool frames)
     }
 }
 
-static void a_running_and_a_killed_run_can_be_read(void **state)
+TEST(a_running_and_a_killed_run_can_be_read)
 {
-    (void)state;
     check_killed(false);
     check_killed(true);
 }
@@ -95,9 +93,8 @@ static void check_refused(const char *dir, const char *reason)
     bt_errors_free(&err);
 }
 
-static void folders_that_cannot_be_written_are_named(void **state)
+TEST(folders_that_cannot_be_written_are_named)
 {
-    (void)state;
     check_refused("/proc/bergtow/out", "No such file");
     check_refused("/dev/null/out", "Not a directory");
     check_refused(in_folder("again/result.h5"), "Not a directory");
@@ -145,9 +142,8 @@ static int run_without_space(rlim_t limit)
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
 }
 
-static void a_full_disk_is_an_error_and_no_crash(void **state)
+TEST(a_full_disk_is_an_error_and_no_crash)
 {
-    (void)state;
     for (rlim_t limit = 0; limit < 3000000; limit = limit ? limit * 3 : 20) {
         const int code = run_without_space(limit);
         if (code) fail_msg("limit %lu bytes: code %d", (unsigned long)limit, code);
@@ -176,13 +172,5 @@ int main(int argc, char **argv)
 {
     self = argv[0];
     if (argc == 3 && strcmp(argv[1], "length") == 0) return print_lengths(argv[2]);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_failed_run_leaves_no_old_summary),
-        cmocka_unit_test(a_running_and_a_killed_run_can_be_read),
-        cmocka_unit_test(folders_that_cannot_be_written_are_named),
-        cmocka_unit_test(a_full_disk_is_an_error_and_no_crash),
-    };
-    int failed;
-    RUN_IN_FOLDER(tests, failed);
-    return failed;
+    return run_in_folder();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which rebounds are lowered, and by how much, on contacts whose impulses and velocities are given.
+#include "test.h"
 #include "all_pairs.h"
 
 #include "solve/solver.h"
@@ -42,9 +43,8 @@ static bt_world *row(double restitution)
 
 /// A step that is solved to 0.2 m/s may have given 0.2 J for each N s, of friction as of a normal impulse: the ½ J of
 /// the first contact is doubtful with 2 N s of friction beside its 1 N s, and not with 1 N s.
-static void what_the_residual_can_have_given_counts_friction(void **state)
+TEST(what_the_residual_can_have_given_counts_friction)
 {
-    (void)state;
     bt_world *w = row(0.6);
     bt_contact *hit = contact_of(w, 0, 1);
     contact_of(w, 1, 2)->ln[0] = 0;
@@ -60,9 +60,8 @@ static void what_the_residual_can_have_given_counts_friction(void **state)
 }
 
 /// By halves, and below a fifth to none; each solution begins with all of it again, whatever the last one has left.
-static void a_rebound_that_gives_energy_is_lowered(void **state)
+TEST(a_rebound_that_gives_energy_is_lowered)
 {
-    (void)state;
     bt_world *w = row(0.6);
     const bt_contact *hit = contact_of(w, 0, 1);
     contact_of(w, 1, 2)->ln[0] = 0;
@@ -82,9 +81,8 @@ static void a_rebound_that_gives_energy_is_lowered(void **state)
 
 /// Another contact of the island may take what a rebound gives, where it is one of edges; what sheets that slide over
 /// each other take is no reason to let it be. Together the contacts lose 4½ J.
-static void sheets_do_not_pay_for_rebounds(void **state)
+TEST(sheets_do_not_pay_for_rebounds)
 {
-    (void)state;
     for (int sheets = 0; sheets < 2; sheets++) {
         bt_world *w = row(0.6);
         assert_true(bt_restitution_begin(w));
@@ -94,12 +92,4 @@ static void sheets_do_not_pay_for_rebounds(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_rebound_that_gives_energy_is_lowered),
-        cmocka_unit_test(what_the_residual_can_have_given_counts_friction),
-        cmocka_unit_test(sheets_do_not_pay_for_rebounds),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

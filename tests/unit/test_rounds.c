@@ -2,6 +2,7 @@
 // What rounds do when the work is spent: on made-up problems whose residual after each sweep is given. Tried: unknowns
 // never kept, kept from the first sweep on, not put back, and put back although the problem is solved; no further
 // attempts, one for ever, and further ones although the result is near: each red.
+#include "test.h"
 #include "all_pairs.h"
 
 #include "solve/rounds.h"
@@ -85,9 +86,8 @@ static void script(double *residual, const double *pairs)
     for (; pairs[0] >= 0; pairs += 2) residual[(int)pairs[0]] = pairs[1];
 }
 
-static void the_best_of_the_second_half_is_the_result(void **state)
+TEST(the_best_of_the_second_half_is_the_result)
 {
-    (void)state;
     double r[SWEEPS];
     script(r, (double[]){3, 2, 13, 5, 15, 3, 17, 4, -1});
     CHECK_CLOSE(run(r), 3, 0);
@@ -96,9 +96,8 @@ static void the_best_of_the_second_half_is_the_result(void **state)
     assert_int_equal(made_up.sweeps, 26);
 }
 
-static void a_better_end_stays(void **state)
+TEST(a_better_end_stays)
 {
-    (void)state;
     double r[SWEEPS];
     script(r, (double[]){15, 3, 25, 2, -1});
     CHECK_CLOSE(run(r), 2, 0);
@@ -106,9 +105,8 @@ static void a_better_end_stays(void **state)
     assert_int_equal(made_up.puts, 1);
 }
 
-static void a_result_far_off_has_further_attempts(void **state)
+TEST(a_result_far_off_has_further_attempts)
 {
-    (void)state;
     double r[SWEEPS];
     script(r, (double[]){31, 3.5, -1}); // in the first of them: ten sweeps with momentum, six without
     CHECK_CLOSE(run(r), 3.5, 0);
@@ -121,9 +119,8 @@ static void a_result_far_off_has_further_attempts(void **state)
     assert_int_equal(made_up.sweeps, 51);
 }
 
-static void a_solution_is_kept_whatever_came_before(void **state)
+TEST(a_solution_is_kept_whatever_came_before)
 {
-    (void)state;
     double r[SWEEPS];
     script(r, (double[]){15, 3, 18, 0.5, -1});
     CHECK_CLOSE(run(r), 0.5, 0);
@@ -165,9 +162,8 @@ static void speed_up(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 
 /// Momentum is that of Nesterov, by what the last sweep has changed, and goes on from one round to the next; of a cell
 /// that comes into the lists with the second there is no such change, and it has none before its first sweep.
-static void what_is_new_in_the_lists_has_no_momentum(void **state)
+TEST(what_is_new_in_the_lists_has_no_momentum)
 {
-    (void)state;
     memset(&apart, 0, sizeof apart);
     bt_world *w = bt_world_create(&(bt_params){.dt = 1, .size = 1, .max_sweeps = 1});
     double v[8];
@@ -223,9 +219,8 @@ static void look(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 
 /// Of a cell whose bodies no sweep has moved, the residual of before counts, and it is looked at no more; after a
 /// settling all are.
-static void a_residual_is_taken_where_something_moved(void **state)
+TEST(a_residual_is_taken_where_something_moved)
 {
-    (void)state;
     bt_world *w = bt_world_create(&(bt_params){.dt = 1, .size = 1, .max_sweeps = 1});
     double v[8];
     scene_square(1, v);
@@ -249,15 +244,4 @@ static void a_residual_is_taken_where_something_moved(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_best_of_the_second_half_is_the_result),
-        cmocka_unit_test(a_better_end_stays),
-        cmocka_unit_test(a_result_far_off_has_further_attempts),
-        cmocka_unit_test(a_solution_is_kept_whatever_came_before),
-        cmocka_unit_test(what_is_new_in_the_lists_has_no_momentum),
-        cmocka_unit_test(a_residual_is_taken_where_something_moved),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -18,9 +18,8 @@ static double in_cell(int n, const double *v, int i, int j)
 }
 
 /// Polygons in the raster, across its sides, around it, on lines between cells; clockwise, too.
-static void areas_in_cells_are_those_of_clipping(void **state)
+TEST(areas_in_cells_are_those_of_clipping)
 {
-    (void)state;
     enum { NX = 7, NY = 5, TRIALS = 300 };
     uint64_t seed = 9;
     for (int trial = 0; trial < TRIALS; trial++) {
@@ -95,9 +94,8 @@ static void check_route(const bt_route_task *t, const bt_route *r, bool sharp)
     assert_true(r->length >= hypot(x - t->start[0], y - t->start[1]) - 1e-9);
 }
 
-static void plans_of_all_kinds_end_at_the_goal(void **state)
+TEST(plans_of_all_kinds_end_at_the_goal)
 {
-    (void)state;
     for (int kind = 0; kind < 8; kind++) {
         static sea s;
         bt_route_task t = task_in(&s);
@@ -123,9 +121,4 @@ static void plans_of_all_kinds_end_at_the_goal(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(areas_in_cells_are_those_of_clipping),
-                                       cmocka_unit_test(plans_of_all_kinds_end_at_the_goal)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Moments, faults, hull and clipping of convex polygons against closed forms and quadrature.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
+#include "test.h"
 #include "bergtow/shape.h"
 
 static void assert_near(double got, double want, double rel)
@@ -19,9 +10,8 @@ static void assert_near(double got, double want, double rel)
         fail_msg("got %.17g, want %.17g (relative %g)", got, want, (got - want) / scale);
 }
 
-static void test_rectangle(void **state)
+TEST(test_rectangle)
 {
-    (void)state;
     const double a = 3, b = 2; // half sides
     double v[] = {-a, -b, a, -b, a, b, -a, b};
     bt_moments m = bt_shape_moments(4, v);
@@ -32,9 +22,8 @@ static void test_rectangle(void **state)
     assert_true(fabs(m.cx) < 1e-15 && fabs(m.cy) < 1e-15);
 }
 
-static void test_regular(void **state)
+TEST(test_regular)
 {
-    (void)state;
     for (int n = 3; n <= 128; n += n < 12 ? 1 : 29) {
         double v[2 * BT_MAX_VERTICES];
         bt_shape_regular(n, 2.5, v);
@@ -81,9 +70,8 @@ static double cubic_numeric(int n, const double *v, double cx, double cy)
     return sum;
 }
 
-static void test_offset_and_cubic(void **state)
+TEST(test_offset_and_cubic)
 {
-    (void)state;
     // centroid, moments and ∫r³ of an irregular polygon far from the origin
     const double at[3][2] = {{0, 0}, {12, -7}, {-4000, 3000}};
     for (int k = 0; k < 3; k++) {
@@ -109,18 +97,16 @@ static void test_offset_and_cubic(void **state)
     assert_near(m.polar, 6 * (9 + 16) / 18.0, 1e-14);
 }
 
-static void test_width(void **state)
+TEST(test_width)
 {
-    (void)state;
     double v[] = {-3, -1, 3, -1, 3, 1, -3, 1};
     assert_near(bt_shape_width(4, v, 1, 0), 2, 1e-15); // moving along x meets the width in y
     assert_near(bt_shape_width(4, v, 0, 1), 6, 1e-15);
     assert_near(bt_shape_width(4, v, sqrt(0.5), sqrt(0.5)), 8 * sqrt(0.5), 1e-14);
 }
 
-static void test_clip(void **state)
+TEST(test_clip)
 {
-    (void)state;
     double v[] = {0, 0, 2, 0, 2, 2, 0, 2}, out[2 * 5];
     assert_int_equal(bt_shape_clip(4, v, 1, 0, 1, out), 4);
     assert_near(bt_shape_moments(4, out).area, 2, 1e-15);
@@ -154,9 +140,8 @@ static void test_clip(void **state)
     assert_true(bt_shape_clip(12, c, 0, 1, 0, o) <= 13);
 }
 
-static void test_hull(void **state)
+TEST(test_hull)
 {
-    (void)state;
     double v[] = {1, 1, 0, 0, 2, 0, 1, 0, 2, 2, 0, 2, 0, 1, 0, 0, 1.5, 0.5};
     int n = bt_shape_hull(9, v);
     assert_int_equal(n, 4);
@@ -187,9 +172,8 @@ static void assert_fault(int n, const double *v, const char *part)
     if (!strstr(why, part)) fail_msg("said \"%s\", expected \"...%s...\"", why, part);
 }
 
-static void test_faults(void **state)
+TEST(test_faults)
 {
-    (void)state;
     double square[] = {0, 0, 1, 0, 1, 1, 0, 1};
     assert_null(bt_shape_fault(4, square));
     double collinear[] = {0, 0, 0.5, 0, 1, 0, 1, 1, 0, 1};
@@ -219,9 +203,8 @@ static void test_faults(void **state)
     assert_fault(5, star, "cross");
 }
 
-static void test_named(void **state)
+TEST(test_named)
 {
-    (void)state;
     double v[2 * BT_MAX_VERTICES];
     int n = bt_shape_named("disc", 30, 20, v);
     assert_null(bt_shape_fault(n, v));
@@ -242,12 +225,4 @@ static void test_named(void **state)
     assert_int_equal(bt_shape_named("banana", 1, 1, v), 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rectangle), cmocka_unit_test(test_regular), cmocka_unit_test(test_offset_and_cubic),
-        cmocka_unit_test(test_width),     cmocka_unit_test(test_clip),    cmocka_unit_test(test_hull),
-        cmocka_unit_test(test_faults),    cmocka_unit_test(test_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

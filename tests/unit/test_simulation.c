@@ -6,7 +6,6 @@
 #include "scene.h"
 
 #include <signal.h>
-#include <stdio.h>
 
 #include "bergtow/forces.h"
 #include "bergtow/simulation.h"
@@ -32,9 +31,8 @@ static bool is_caught(int number)
     return now.sa_handler != SIG_DFL;
 }
 
-static void handlers_stay_to_the_end_of_the_last(void **state)
+TEST(handlers_stay_to_the_end_of_the_last)
 {
-    (void)state;
     assert_false(is_caught(SIGINT));
     bt_simulation *first = begun(true), *second = begun(true);
     bt_simulation_drop(first);
@@ -43,9 +41,8 @@ static void handlers_stay_to_the_end_of_the_last(void **state)
     assert_false(is_caught(SIGINT) || is_caught(SIGUSR1));
 }
 
-static void a_request_to_stop_is_of_those_that_listen(void **state)
+TEST(a_request_to_stop_is_of_those_that_listen)
 {
-    (void)state;
     bt_simulation *listens = begun(true), *deaf = begun(false);
     assert_int_equal(bt_simulation_step(listens, 1), BT_OK);
     raise(SIGTERM);
@@ -64,9 +61,8 @@ static void a_request_to_stop_is_of_those_that_listen(void **state)
 
 static void add_nothing(const bt_force_body *b, bt_load *l) { (void)b, (void)l; }
 
-static void a_law_that_comes_later_is_not_in_the_case(void **state)
+TEST(a_law_that_comes_later_is_not_in_the_case)
 {
-    (void)state;
     static const bt_law_key keys[] = {
         {.name = "strength", .unit = "N", .preset = "3", .range = "(0, 10]", .doc = "how strong the late law is"}};
     static const bt_force_law law = {.name = "late", .doc = "a law that comes late", .keys = keys, .n_keys = 1,
@@ -84,22 +80,12 @@ static void a_law_that_comes_later_is_not_in_the_case(void **state)
     bt_simulation_drop(after);
 }
 
-static void options_that_are_none_are_refused(void **state)
+TEST(options_that_are_none_are_refused)
 {
-    (void)state;
     bt_simulation *s;
     const bt_simulation_options o = {.text = still_water, .threads = 1, .n_set = -1};
     assert_int_equal(bt_simulation_create(&s, &o), BT_ERR_USAGE);
     assert_non_null(strstr(bt_last_error(), "n_set: -1"));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(handlers_stay_to_the_end_of_the_last),
-        cmocka_unit_test(a_request_to_stop_is_of_those_that_listen),
-        cmocka_unit_test(a_law_that_comes_later_is_not_in_the_case),
-        cmocka_unit_test(options_that_are_none_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

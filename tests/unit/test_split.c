@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Splitting of a floe: closed forms of the law, what a section carries against quadrature, and cuts that lose nothing.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-#include <math.h>
-#include <string.h>
-
+#include "test.h"
 #include "base/rng.h"
 #include "split/cut.h"
 #include "split/find.h"
@@ -106,9 +98,8 @@ static double critical(const bt_split_floe *f, const bt_floe_load *load, int n, 
     return high;
 }
 
-static void test_strength(void **state)
+TEST(test_strength)
 {
-    (void)state;
     const bt_split_law law = law_of(1);
     assert_near(bt_split_strength(&law, 1e6, true), 0.75 * K / 1e3, 1e-6);   // fracture mechanics
     assert_near(bt_split_strength(&law, 1e6, false), 1.4 * K / 1e3, 1e-6);
@@ -121,9 +112,8 @@ static void test_strength(void **state)
 }
 
 // K_I of a pair at the mouth of an edge crack, by finite elements: F_y = 0.187 h K sqrt(L) in a square.
-static void test_opening_pair(void **state)
+TEST(test_opening_pair)
 {
-    (void)state;
     const double sides[] = {10, 30, 100}, h = 1.3;
     double force[3];
     for (int i = 0; i < 3; i++) {
@@ -162,9 +152,8 @@ static void test_opening_pair(void **state)
 }
 
 // A wedge with the thrust that presses it in: F_x = r 0.75/(4 - 0.75 r) h K sqrt(L). Beyond r = 16/3 it opens nothing.
-static void test_wedge(void **state)
+TEST(test_wedge)
 {
-    (void)state;
     const double l = 30, h = 1, mu = 0.1;
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, h);
@@ -192,9 +181,8 @@ static void test_wedge(void **state)
 }
 
 // Between two plates of width w: (pi/2) sigma_c h B/(1 - (w/B)^1.5), the Brazilian test at w = 0.
-static void test_squeezed(void **state)
+TEST(test_squeezed)
 {
-    (void)state;
     const double l = 30, h = 1;
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, h);
@@ -212,9 +200,8 @@ static void test_squeezed(void **state)
 
 // A thrust that the floe's own inertia balances: N = 0, M = F L/8; of beam theory's 0.75 F/(h L) at the far end 0.30 is
 // left, and across the force it bursts at 0.43.
-static void test_free_thrust(void **state)
+TEST(test_free_thrust)
 {
-    (void)state;
     const double l = 30, h = 2;
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, h);
@@ -237,9 +224,8 @@ static void test_free_thrust(void **state)
 }
 
 // A force at the middle of a side, held at two fixed posts: 1.5 F/(h L) at the far end, nothing taken off.
-static void test_three_point(void **state)
+TEST(test_three_point)
 {
-    (void)state;
     const double l = 30, h = 1;
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, h);
@@ -257,9 +243,8 @@ static void test_three_point(void **state)
 }
 
 // A strip l x b. Struck at its end it bends as F x (1 - x/l)^2, most at a third: 4 F l/27; struck in its middle F l/8.
-static void test_strip(void **state)
+TEST(test_strip)
 {
-    (void)state;
     const double l = 60, b = 3, h = 1;
     const floe f = rectangle(b, l);
     const bt_split_floe s = seen(&f, h);
@@ -281,9 +266,8 @@ static void test_strip(void **state)
 }
 
 // The speed at which a floe splits on a corner that it runs against, F = v √(2 p h tan(φ) m), does not depend on h.
-static void test_collision(void **state)
+TEST(test_collision)
 {
-    (void)state;
     const double sides[] = {3, 10, 30, 100}, want45[] = {1.41, 0.77, 0.45, 0.24}, want30[] = {0.81, 0.44, 0.26, 0.14};
     const double p = 1.5e6, rho = 910, mu = 0.1, l0 = 0.75 * 0.75 * K * K / STRENGTH / STRENGTH;
     for (int j = 0; j < 2; j++)
@@ -306,9 +290,8 @@ static void test_collision(void **state)
 }
 
 /// Peaks of two collisions are not added, and each is added to what persists.
-static void test_peaks(void **state)
+TEST(test_peaks)
 {
-    (void)state;
     const double l = 30;
     const floe f = rectangle(l, l);
     const bt_split_floe s = seen(&f, 1);
@@ -326,9 +309,8 @@ static void test_peaks(void **state)
 }
 
 /// Both parts of a floe say the same of the section between them: the same force, the opposite moment.
-static void test_sides_agree(void **state)
+TEST(test_sides_agree)
 {
-    (void)state;
     bt_rng r = bt_rng_start(1, BT_RNG_PLACE, 0);
     for (int trial = 0; trial < 2000; trial++) {
         const floe f = random_floe(&r, trial % 2);
@@ -354,9 +336,8 @@ static void test_sides_agree(void **state)
 }
 
 /// What a section carries, by summing the inertia of small squares of the floe left of it.
-static void test_section_by_quadrature(void **state)
+TEST(test_section_by_quadrature)
 {
-    (void)state;
     bt_rng r = bt_rng_start(2, BT_RNG_PLACE, 0);
     for (int trial = 0; trial < 4; trial++) {
         const floe f = random_floe(&r, true);
@@ -435,9 +416,8 @@ static double ratio_of(const bt_split_floe *s, const bt_load_case *w, const bt_s
 }
 
 /// No section at all is above the bound, and where the quick reject says that nothing can split, nothing does.
-static void test_bound(void **state)
+TEST(test_bound)
 {
-    (void)state;
     bt_rng r = bt_rng_start(3, BT_RNG_PLACE, 0);
     double tightest = 0;
     for (int trial = 0; trial < 4000; trial++) {
@@ -493,9 +473,8 @@ static void shuffle(bt_rng *r, bt_floe_load *load, int n)
 }
 
 /// The order of the loads changes no bit; turned or mirrored, the same section is found to rounding.
-static void test_same_from_all_sides(void **state)
+TEST(test_same_from_all_sides)
 {
-    (void)state;
     bt_rng r = bt_rng_start(4, BT_RNG_PLACE, 0);
     int n_split = 0;
     for (int trial = 0; trial < 1000; trial++) {
@@ -552,9 +531,8 @@ static void test_same_from_all_sides(void **state)
 }
 
 /// A twin of s times the lengths, s^1.5 the toughness, s the strength and s^3 the forces splits alike.
-static void test_froude(void **state)
+TEST(test_froude)
 {
-    (void)state;
     bt_rng r = bt_rng_start(5, BT_RNG_PLACE, 0);
     for (int trial = 0; trial < 100; trial++) {
         const floe f = random_floe(&r, trial % 2);
@@ -595,9 +573,8 @@ static void assert_nothing_lost(double area, double polar, const bt_piece *piece
     for (int k = 0; k < 5; k++) assert_within(sum[k], own[k], 1e-13 * scale[k]);
 }
 
-static void test_cuts(void **state)
+TEST(test_cuts)
 {
-    (void)state;
     bt_rng r = bt_rng_start(6, BT_RNG_CUT, 0);
     int cuts = 0, concave = 0;
     for (int trial = 0; cuts < 1000; trial++) {
@@ -638,9 +615,8 @@ static void test_cuts(void **state)
 }
 
 /// Ends within slop of a vertex are that vertex.
-static void test_snap(void **state)
+TEST(test_snap)
 {
-    (void)state;
     const floe f = rectangle(10, 10);
     bt_chord c;
     assert_true(bt_chord_from(4, f.v, bt_chord_nearest(4, f.v, -4.95, -5, 0.1), 9.95, 10, 0.1, &c));
@@ -664,9 +640,8 @@ static void test_snap(void **state)
 }
 
 /// What the law does not allow is named, with the ratio that it had.
-static void test_refused(void **state)
+TEST(test_refused)
 {
-    (void)state;
     const floe f = rectangle(30, 30), strip = rectangle(30, 5);
     const bt_split_floe s = seen(&f, 1), t = seen(&strip, 1);
     bt_split_law law = law_of(16);
@@ -714,9 +689,8 @@ static void halve(const bt_piece *p, const bt_split_law *law, double *area, int 
     for (int k = 0; k < 2; k++) halve(&half[k], law, area, pieces);
 }
 
-static void test_cascade(void **state)
+TEST(test_cascade)
 {
-    (void)state;
     bt_piece whole = {.n = 4, .convex = true, .area = 900, .polar = 135000};
     memcpy(whole.outline, rectangle(30, 30).v, sizeof whole.outline);
     const bt_split_law law = law_of(2.9);
@@ -737,9 +711,8 @@ static void count(double area, bt_gid ancestor, int64_t path, double least, int 
     else number[generation]++;
 }
 
-static void test_forced_cascade(void **state)
+TEST(test_forced_cascade)
 {
-    (void)state;
     enum { FLOES = 20000 };
     for (int i = 0; i < 2; i++) {
         const double f = i ? 0.8 : 0.6, least = pow(-log(1 - f) / log(2), 0.1);
@@ -755,9 +728,8 @@ static void test_forced_cascade(void **state)
     }
 }
 
-static void test_scatter(void **state)
+TEST(test_scatter)
 {
-    (void)state;
     enum { DRAWS = 20000 };
     int below[3] = {0};
     const double at[3] = {0.9, 1, 1.1};
@@ -777,29 +749,4 @@ static void test_scatter(void **state)
                 w != bt_split_scatter(4, 5, 2, 8));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_strength),
-        cmocka_unit_test(test_opening_pair),
-        cmocka_unit_test(test_wedge),
-        cmocka_unit_test(test_squeezed),
-        cmocka_unit_test(test_free_thrust),
-        cmocka_unit_test(test_three_point),
-        cmocka_unit_test(test_strip),
-        cmocka_unit_test(test_collision),
-        cmocka_unit_test(test_peaks),
-        cmocka_unit_test(test_sides_agree),
-        cmocka_unit_test(test_section_by_quadrature),
-        cmocka_unit_test(test_bound),
-        cmocka_unit_test(test_same_from_all_sides),
-        cmocka_unit_test(test_froude),
-        cmocka_unit_test(test_cuts),
-        cmocka_unit_test(test_snap),
-        cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_cascade),
-        cmocka_unit_test(test_forced_cascade),
-        cmocka_unit_test(test_scatter),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -5,20 +5,11 @@
 // Each row of the table changes one number of a real state. What turns this red (tried): leaving out the check of the
 // cells' box, of the order of contacts, of the width of a row in result.h5, of the space that a dataset takes in the
 // file.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-// cmocka.h wants setjmp.h, stdarg.h, stddef.h and stdint.h first
-#include <cmocka.h>
 
 #include <hdf5.h>
-#include <math.h>
 
+#include "test.h"
 #include "output/checkpoint.h"
 #include "loads/impact.h"
 #include "bergtow/run.h"
@@ -203,9 +194,8 @@ static bt_status take_up(const bt_case *c, bt_snapshot *s, bt_errors *err)
     return status;
 }
 
-static void nonsense_is_refused_by_name(void **state)
+TEST(nonsense_is_refused_by_name)
 {
-    (void)state;
     for (int k = -N_CASES; k < N_CHANGES; k++) {
         const struct change *change = k < 0 ? NULL : &changes[k];
         const int from = change ? change->from : k + N_CASES;
@@ -234,9 +224,8 @@ static void nonsense_is_refused_by_name(void **state)
     }
 }
 
-static void contacts_out_of_order_are_refused(void **state)
+TEST(contacts_out_of_order_are_refused)
 {
-    (void)state;
     bt_snapshot s = {.path = "checkpoint"};
     bt_errors err = {0};
     for (int j = 0; j < kept[0].state.n; j++) {
@@ -296,9 +285,8 @@ static void write_make(const char *path, int make)
     must(bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, &err), &err);
 }
 
-static void files_of_another_make_are_refused(void **state)
+TEST(files_of_another_make_are_refused)
 {
-    (void)state;
     for (int make = 0; make < N_MAKES; make++) {
         char *path = strdup(in_folder("make.h5"));
         write_make(path, make);
@@ -313,9 +301,8 @@ static void files_of_another_make_are_refused(void **state)
 }
 
 /// Before: the case that had not been read was released.
-static void a_checkpoint_without_a_case_is_refused(void **state)
+TEST(a_checkpoint_without_a_case_is_refused)
 {
-    (void)state;
     bt_errors err = {0};
     bt_snapshot s = {0};
     bt_snapshot_add_int(&s, "world/step", 3);
@@ -357,9 +344,8 @@ static bt_status resumed_with(const bt_snapshot *from, const char *name, int64_t
 }
 
 /// What the loop of a run goes by. What is sound is gone on from: the wall time grows by that of the steps.
-static void numbers_of_a_run_are_refused_by_name(void **state)
+TEST(numbers_of_a_run_are_refused_by_name)
 {
-    (void)state;
     static const struct {
         const char *name;
         int64_t at;
@@ -396,9 +382,8 @@ static void numbers_of_a_run_are_refused_by_name(void **state)
 }
 
 /// A row that is wider than the room for it would be written beyond it.
-static void rows_of_another_width_are_refused(void **state)
+TEST(rows_of_another_width_are_refused)
 {
-    (void)state;
     const char *path = in_folder("rows.h5");
     static const struct { int64_t first, n, width; bool good;
     } reads[] = {
@@ -425,15 +410,7 @@ static void rows_of_another_width_are_refused(void **state)
 int main(void)
 {
     if (!mkdtemp(folder)) return 1;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nonsense_is_refused_by_name),
-        cmocka_unit_test(contacts_out_of_order_are_refused),
-        cmocka_unit_test(files_of_another_make_are_refused),
-        cmocka_unit_test(a_checkpoint_without_a_case_is_refused),
-        cmocka_unit_test(numbers_of_a_run_are_refused_by_name),
-        cmocka_unit_test(rows_of_another_width_are_refused),
-    };
-    const int failed = cmocka_run_group_tests(tests, make_states, free_states);
+    const int failed = run_all_tests(make_states, free_states);
     char command[160];
     snprintf(command, sizeof command, "rm -rf %s", folder);
     return system(command) != 0 || failed;

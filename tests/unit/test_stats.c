@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Standard error against series of known autocorrelation, and the steady window against a known transient.
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <cmocka.h>
-
+#include "test.h"
 #include "bergtow/stats.h"
 
 /// splitmix64 and Box–Muller: a source of normal numbers of the test's own.
@@ -65,9 +59,8 @@ static void check_coverage(double phi, int n)
     assert_true(fabs(sd_sum / 2 - 1) < 0.05);
 }
 
-static void the_interval_of_correlated_series_covers(void **s)
+TEST(the_interval_of_correlated_series_covers)
 {
-    (void)s;
     check_coverage(0.0, 1000);
     check_coverage(0.5, 1000);
     check_coverage(0.9, 4000);
@@ -76,9 +69,8 @@ static void the_interval_of_correlated_series_covers(void **s)
 
 /// Noise whose slow part is taken back later, as ice that one jam has used up is missing in the next: x_i = e_i − θ
 /// e_{i−LAG}. Its mean has the variance (1 − θ)² / n, while the autocorrelation is zero up to LAG.
-static void what_is_taken_back_later_is_seen(void **state)
+TEST(what_is_taken_back_later_is_seen)
 {
-    (void)state;
     enum { N = 2000, LAG = 60, SERIES = 200 };
     static double e[N + LAG], x[N];
     const double theta = 0.5;
@@ -125,9 +117,8 @@ static double alarms(int n, double phi, change kind, double size)
 
 /// A drift of d parts the means of the halves by d/2, whose standard error is twice that of the mean: three of them are
 /// d = 12.
-static void a_drift_is_told_from_noise(void **state)
+TEST(a_drift_is_told_from_noise)
 {
-    (void)state;
     static const struct {
         int n;
         double phi;
@@ -152,9 +143,8 @@ static void a_drift_is_told_from_noise(void **state)
     assert_true(false_sum <= 5 && drift_sum >= 90);
 }
 
-static void the_trend_is_the_line_through_the_series(void **state)
+TEST(the_trend_is_the_line_through_the_series)
 {
-    (void)state;
     double x[960], quarter[4];
     for (int i = 0; i < 960; i++) x[i] = 3 + 2.0 * i / 960 + 0.1 * cos(2 * BT_PI * 20 * (i + 0.5) / 960);
     const bt_trend t = bt_stats_trend(x, 960);
@@ -168,9 +158,8 @@ static void the_trend_is_the_line_through_the_series(void **state)
     assert_true(!bt_stats_trend(x, 960).significant && bt_stats_trend(x, 960).change == 0);
 }
 
-static void constant_series_have_no_error(void **s)
+TEST(constant_series_have_no_error)
 {
-    (void)s;
     double x[1000];
     for (int i = 0; i < 1000; i++) x[i] = 0.1;
     const bt_mean m = bt_stats_mean(x, 1000);
@@ -179,9 +168,8 @@ static void constant_series_have_no_error(void **s)
     assert_int_equal(bt_stats_steady_start(x, 1000, 300, 0.02), 300);
 }
 
-static void short_series(void **s)
+TEST(short_series)
 {
-    (void)s;
     const double x[2] = {1, 4};
     bt_mean m = bt_stats_mean(x, 0);
     assert_true(isnan(m.mean) && isnan(m.sd) && isnan(m.se) && m.n == 0 && m.n_eff == 0);
@@ -193,18 +181,16 @@ static void short_series(void **s)
     assert_int_equal(bt_stats_steady_start(x, 2, 5, 0.02), 5);
 }
 
-static void alternating_series_keep_an_error_above_zero(void **s)
+TEST(alternating_series_keep_an_error_above_zero)
 {
-    (void)s;
     double x[500];
     for (int i = 0; i < 500; i++) x[i] = i % 2 ? 1 : -1;
     const bt_mean m = bt_stats_mean(x, 500);
     assert_true(m.mean == 0 && m.se > 0 && m.se < 1.0 / sqrt(500));
 }
 
-static void not_a_number_stays_visible(void **s)
+TEST(not_a_number_stays_visible)
 {
-    (void)s;
     double x[50];
     for (int i = 0; i < 50; i++) x[i] = i;
     x[20] = NAN;
@@ -212,9 +198,8 @@ static void not_a_number_stays_visible(void **s)
     assert_true(isnan(m.mean) && isnan(m.se) && isnan(m.n_eff));
 }
 
-static void a_large_offset_does_not_drown_the_spread(void **s)
+TEST(a_large_offset_does_not_drown_the_spread)
 {
-    (void)s;
     enum { N = 100000 };
     static double x[N], y[N];
     uint64_t state = 5;
@@ -228,9 +213,8 @@ static void a_large_offset_does_not_drown_the_spread(void **s)
     assert_true(fabs(a.se / b.se - 1) < 1e-5 && fabs(a.sd / b.sd - 1) < 1e-5);
 }
 
-static void the_transient_is_cut(void **s)
+TEST(the_transient_is_cut)
 {
-    (void)s;
     enum { N = 2000, TRANSIENT = 400 };
     double x[N];
     uint64_t state = 99;
@@ -259,9 +243,8 @@ static void the_transient_is_cut(void **s)
 
 /// Rare large values of a wide distribution, as of a body that meets floes one by one, are no transient: a start just
 /// after the last large one would leave too low a mean.
-static void rare_large_values_are_not_cut(void **s)
+TEST(rare_large_values_are_not_cut)
 {
-    (void)s;
     enum { N = 4000, SERIES = 400 };
     static double x[N];
     static const double events[] = {6, 25, 100};
@@ -280,9 +263,8 @@ static void rare_large_values_are_not_cut(void **s)
 }
 
 /// A series that settles to its end has its minimum at the last start, however far apart the starts lie.
-static void the_end_of_the_search_is_known(void **s)
+TEST(the_end_of_the_search_is_known)
 {
-    (void)s;
     for (int64_t n = 19990; n < 90000; n += 997) {
         double *x = malloc((size_t)n * sizeof *x);
         assert_non_null(x);
@@ -298,9 +280,8 @@ static void the_end_of_the_search_is_known(void **s)
 
 /// A long series: the starts that are looked at lie apart so far that they are few, and the one that is found is the
 /// best of them.
-static void starts_of_a_long_series_are_few(void **s)
+TEST(starts_of_a_long_series_are_few)
 {
-    (void)s;
     enum { MANY = 5 * BT_STATS_STARTS };
     const int64_t n[] = {1, MANY, MANY + 1, 2 * MANY, 2 * MANY + 1, 1000 * (int64_t)MANY},
                   step[] = {5, 5, 10, 10, 20, 5120};
@@ -317,22 +298,4 @@ static void starts_of_a_long_series_are_few(void **s)
     free(x);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(starts_of_a_long_series_are_few),
-        cmocka_unit_test(the_interval_of_correlated_series_covers),
-        cmocka_unit_test(what_is_taken_back_later_is_seen),
-        cmocka_unit_test(a_drift_is_told_from_noise),
-        cmocka_unit_test(the_trend_is_the_line_through_the_series),
-        cmocka_unit_test(constant_series_have_no_error),
-        cmocka_unit_test(short_series),
-        cmocka_unit_test(alternating_series_keep_an_error_above_zero),
-        cmocka_unit_test(not_a_number_stays_visible),
-        cmocka_unit_test(a_large_offset_does_not_drown_the_spread),
-        cmocka_unit_test(the_transient_is_cut),
-        cmocka_unit_test(rare_large_values_are_not_cut),
-        cmocka_unit_test(the_end_of_the_search_is_known),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

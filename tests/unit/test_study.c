@@ -1,17 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Studies: members of grids and Latin hypercubes, their names, seeds and values.
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
+#include "test.h"
 #include "bergtow/study.h"
 
 static bt_study read_text(const char *text)
@@ -36,9 +27,8 @@ static bool has(const bt_member *m, const char *set)
     return false;
 }
 
-static void grid_holds_every_combination_once(void **state)
+TEST(grid_holds_every_combination_once)
 {
-    (void)state;
     bt_study s =
         read_text("base: a.yml\nset: {run.duration: 60 s}\nparameters:\n  ice.concentration: [0.2, 0.5, 80 %]\n  "
                   "tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}\n"
@@ -81,9 +71,8 @@ static void grid_holds_every_combination_once(void **state)
     bt_study_free(&s);
 }
 
-static void hypercube_has_one_sample_in_each_stratum(void **state)
+TEST(hypercube_has_one_sample_in_each_stratum)
 {
-    (void)state;
     bt_study s = read_text("base: a.yml\nsampling: latin-hypercube\nsamples: 50\nrepeats: 2\nparameters:\n  "
                            "ice.thickness: {from: 1 m, to: 3 m}\n"
                            "  ice.size: {from: 10 m, to: 1000 m, scale: log}\n  ice.shape: [voronoi, rectangles]\n");
@@ -113,9 +102,8 @@ static void hypercube_has_one_sample_in_each_stratum(void **state)
     bt_study_free(&s);
 }
 
-static void common_fields_are_the_same_in_every_condition(void **state)
+TEST(common_fields_are_the_same_in_every_condition)
 {
-    (void)state;
     const char *text = "base: a.yml\nrepeats: 3\nfields: %s\nparameters:\n  run.dt: [1 s, 2 s]\n";
     int64_t seed[2][6];
     for (int k = 0; k < 2; k++) {
@@ -159,9 +147,8 @@ static void count_corners(const char *how, int n[33])
 /// Share of a triangular distribution below k of its seven whole numbers.
 static double peaked_below(int k) { return k < 4 ? 2. * k * k / 49 : 1 - 2. * (7 - k) * (7 - k) / 49; }
 
-static void whole_numbers_are_drawn_as_often_as_their_share(void **state)
+TEST(whole_numbers_are_drawn_as_often_as_their_share)
 {
-    (void)state;
     int even[33] = {0}, logarithmic[33] = {0}, peaked[33] = {0}, sum = 0;
     count_corners("distribution: uniform", even);
     count_corners("scale: log", logarithmic);
@@ -176,11 +163,4 @@ static void whole_numbers_are_drawn_as_often_as_their_share(void **state)
     assert_int_equal(sum, 700);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once),
-                                       cmocka_unit_test(common_fields_are_the_same_in_every_condition),
-                                       cmocka_unit_test(hypercube_has_one_sample_in_each_stratum),
-                                       cmocka_unit_test(whole_numbers_are_drawn_as_often_as_their_share)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -25,9 +25,8 @@ static const char *json_value(const char *json, const char *key)
     return value;
 }
 
-static void summary_holds_the_numbers(void **state)
+TEST(summary_holds_the_numbers)
 {
-    (void)state;
     bt_errors err = {0};
     const bt_case c = made_up_case();
     assert_int_equal(write_run(in_folder("a"), &c, 600, 3, &err), BT_OK);
@@ -115,9 +114,8 @@ static void broken_number(bt_sample *s, int i)
     if (i == 400) s->ice_resistance = NAN;
 }
 
-static void every_doubt_is_reported(void **state)
+TEST(every_doubt_is_reported)
 {
-    (void)state;
     bt_case c = made_up_case();
     bt_run_totals t = totals(600);
 
@@ -204,9 +202,8 @@ static void rising_ice(bt_sample *s, int i)
 static void one_wild_step(bt_sample *s, int i) { sound_tow(s, i), s->residual = i == 500 ? 0.2 : s->residual; }
 static void few_unconverged(bt_sample *s, int i) { sound_tow(s, i), s->unconverged = i > 300 && i % 50 == 0; }
 
-static void the_window_serves_every_series(void **state)
+TEST(the_window_serves_every_series)
 {
-    (void)state;
     bt_case c = made_up_case();
     const bt_run_totals t = totals(600);
     char *json = summary_of(&c, 600, &t, FLOES, sound_tow);
@@ -238,9 +235,8 @@ static void the_window_serves_every_series(void **state)
     free(json);
 }
 
-static void what_no_mean_goes_across_is_a_verdict(void **state)
+TEST(what_no_mean_goes_across_is_a_verdict)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     double programme[] = {0, 1, 40, 1, 50, 0.5};
@@ -271,9 +267,8 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
     }
 }
 
-static void without_a_towed_body_forces_are_null(void **state)
+TEST(without_a_towed_body_forces_are_null)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.reference.mean_force = NAN;
     const bt_run_totals t = totals(20);
@@ -309,9 +304,8 @@ static void before_it_was_measured(bt_sample *s, int i)
 
 /// Estimates are those of the speed that the body made through the ice in the window; of the speed ordered where a part
 /// of it is not known; and nothing tows a body that is adrift.
-static void estimates_take_the_speed_of_the_window(void **state)
+TEST(estimates_take_the_speed_of_the_window)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 30;
     c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
@@ -344,9 +338,8 @@ static void never_touched(bt_sample *s, int i)
 }
 
 /// A body that no floe touched: no number of samples says what the ice resists, and no estimate is held against it.
-static void a_body_that_met_no_ice_tells_nothing(void **state)
+TEST(a_body_that_met_no_ice_tells_nothing)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
@@ -367,9 +360,8 @@ static int spikes_apart;
 static void spikes(bt_sample *s, int i) { set_forces(s, i % spikes_apart == 0 ? 1000 : 0, 121 + 10 * noise(i)); }
 
 /// Nearly every step of a body that meets floes one by one is an independent sample, of nothing.
-static void a_few_collisions_are_few_samples(void **state)
+TEST(a_few_collisions_are_few_samples)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     const bt_run_totals t = totals(600);
@@ -395,9 +387,8 @@ static void carried(bt_sample *s, int i) { set_forces(s, 500 + (i % 100 == 0 ? 1
 static void giant(bt_sample *s, int i) { set_forces(s, 100 + 10 * noise(i) + (i == 400 ? 1e6 : 0), 121); }
 
 /// Nor is a floe that is carried on the bow all the time more than its hits, or a contact with one giant step.
-static void contact_without_a_pause_may_be_few_samples(void **state)
+TEST(contact_without_a_pause_may_be_few_samples)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     const bt_run_totals t = totals(600);
@@ -410,9 +401,8 @@ static void contact_without_a_pause_may_be_few_samples(void **state)
 }
 
 /// Of a few collisions the first is no transient: a window that began after it would hold the others alone.
-static void a_few_collisions_begin_no_window(void **state)
+TEST(a_few_collisions_begin_no_window)
 {
-    (void)state;
     bt_case c = made_up_case();
     const bt_run_totals t = totals(600);
     char *json = summary_of(&c, 600, &t, FLOES, early_collision);
@@ -424,9 +414,8 @@ static void a_few_collisions_begin_no_window(void **state)
 static void slow_ripple(bt_sample *s, int i) { set_forces(s, 1000 + 10 * sin(2 * BT_PI * i / 200.0), 1000); }
 
 /// A slow wave of one per cent of the mean leaves nothing to doubt.
-static void a_small_wave_needs_no_longer_run(void **state)
+TEST(a_small_wave_needs_no_longer_run)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     const bt_run_totals t = totals(600);
@@ -442,9 +431,8 @@ static void second_branch_parts(bt_sample *s, int i)
 }
 
 /// Its zeros are no tension, and its largest stays.
-static void a_branch_that_has_parted_has_no_mean(void **state)
+TEST(a_branch_that_has_parted_has_no_mean)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     bt_event event[] = {{.time = 10, .kind = BT_EVENT_LINE_BROKEN, .subject = 2, .value = 5000}};
@@ -466,9 +454,8 @@ static bool turned;
 static void line_turns_it(bt_sample *s, int i) { sound_tow(s, i), s->body_yaw = turned && i >= 100 ? 0.5 * BT_PI : 0; }
 
 /// A body that its line has turned pushes ice over the width that it has then.
-static void the_width_is_that_of_the_window(void **state)
+TEST(the_width_is_that_of_the_window)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
@@ -483,9 +470,8 @@ static void the_width_is_that_of_the_window(void **state)
 }
 
 /// The ice that overtakes the body in a moving window is what it met before.
-static void ice_that_overtakes_a_window_is_reported(void **state)
+TEST(ice_that_overtakes_a_window_is_reported)
 {
-    (void)state;
     bt_case c = made_up_case();
     bt_run_totals t = totals(600);
     const bt_undisturbed ice = {.drift_x = -12};
@@ -499,9 +485,8 @@ static void ice_that_overtakes_a_window_is_reported(void **state)
 }
 
 /// A branch that parts and a programme that changes before the window, or beyond it, are no part of its mean.
-static void what_lies_beyond_the_window_does_not_judge_it(void **state)
+TEST(what_lies_beyond_the_window_does_not_judge_it)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     double before[] = {0, 0.5, 10, 0.5, 15, 1}, beyond[] = {0, 1, 61, 1, 70, 0.5};
@@ -520,9 +505,8 @@ static void what_lies_beyond_the_window_does_not_judge_it(void **state)
 }
 
 /// Floes that come back as they were count among those that fell behind, not among the places ahead.
-static void disturbed_ice_that_comes_back_is_reported(void **state)
+TEST(disturbed_ice_that_comes_back_is_reported)
 {
-    (void)state;
     bt_case c = made_up_case();
     c.output.window_start = 20;
     const bt_undisturbed ice = {.drift_x = -12};
@@ -545,9 +529,8 @@ static void disturbed_ice_that_comes_back_is_reported(void **state)
 }
 
 /// Of the branches that a run has, the strongest, whichever it is.
-static void the_peak_tension_is_of_the_strongest_branch(void **state)
+TEST(the_peak_tension_is_of_the_strongest_branch)
 {
-    (void)state;
     bt_steady s;
     bt_steady_none(&s);
     assert_true(isnan(bt_steady_peak_tension(&s, false)));
@@ -560,26 +543,5 @@ static void the_peak_tension_is_of_the_strongest_branch(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(summary_holds_the_numbers),
-        cmocka_unit_test(the_peak_tension_is_of_the_strongest_branch),
-        cmocka_unit_test(every_doubt_is_reported),
-        cmocka_unit_test(the_window_serves_every_series),
-        cmocka_unit_test(what_no_mean_goes_across_is_a_verdict),
-        cmocka_unit_test(estimates_take_the_speed_of_the_window),
-        cmocka_unit_test(a_body_that_met_no_ice_tells_nothing),
-        cmocka_unit_test(ice_that_overtakes_a_window_is_reported),
-        cmocka_unit_test(what_lies_beyond_the_window_does_not_judge_it),
-        cmocka_unit_test(disturbed_ice_that_comes_back_is_reported),
-        cmocka_unit_test(a_few_collisions_are_few_samples),
-        cmocka_unit_test(a_few_collisions_begin_no_window),
-        cmocka_unit_test(contact_without_a_pause_may_be_few_samples),
-        cmocka_unit_test(a_small_wave_needs_no_longer_run),
-        cmocka_unit_test(a_branch_that_has_parted_has_no_mean),
-        cmocka_unit_test(the_width_is_that_of_the_window),
-        cmocka_unit_test(without_a_towed_body_forces_are_null),
-    };
-    int failed;
-    RUN_IN_FOLDER(tests, failed);
-    return failed;
+    return run_in_folder();
 }

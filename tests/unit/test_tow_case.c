@@ -3,7 +3,6 @@
 // from it.
 #include "scene.h"
 
-#include <stdio.h>
 
 #include "case/rope.h"
 #include "case/case_check.h"
@@ -27,9 +26,8 @@ static void finish(bt_case *c)
 }
 
 /// Against the sources: OrcaFlex gives for 50 mm wire 1583 kN and 10 kg/m; MoorPy's HMPE of 60 mm 2229 kN.
-static void named_lines(void **state)
+TEST(named_lines)
 {
-    (void)state;
     const bt_rope wire = bt_rope_named(BT_ROPE_STEEL, 0.05), pp = bt_rope_named(BT_ROPE_POLYPROPYLENE, 0.1),
                   hmpe = bt_rope_named(BT_ROPE_DYNEEMA, 0.06);
     CHECK_CLOSE(wire.breaking, 1583.4e3, 0.1e3);
@@ -66,9 +64,8 @@ static void set_programme(bt_case *c, int n, const double *p)
 }
 
 /// Trapezes by hand, and the speed that the tow itself uses, added up finely.
-static void way_of_a_programme(void **state)
+TEST(way_of_a_programme)
 {
-    (void)state;
     bt_case c = made();
     set_programme(&c, 4, (double[]){10, 0.5, 30, 1.5, 100, 1.5, 120, 0});
     finish(&c);
@@ -104,9 +101,8 @@ static void way_of_a_programme(void **state)
 
 /// Bridle on a rectangle that stands askew: branches from its outermost corners, the end dead ahead, one just taut,
 /// none stretched.
-static void a_bridle_starts_taut(void **state)
+TEST(a_bridle_starts_taut)
 {
-    (void)state;
     bt_case c = made();
     c.tow.mode = BT_TOW_LINE;
     c.tow.direction = 0.4;
@@ -137,9 +133,8 @@ static void a_bridle_starts_taut(void **state)
     bt_case_free(&c);
 }
 
-static void the_first_waypoint_gives_the_course(void **state)
+TEST(the_first_waypoint_gives_the_course)
 {
-    (void)state;
     bt_case c = made();
     c.tow.mode = BT_TOW_THRUST;
     c.tow.vessel.mass = 1000, c.tow.vessel.bollard_pull = 100, c.tow.vessel.free_speed = 5;
@@ -158,10 +153,4 @@ static void the_first_waypoint_gives_the_course(void **state)
     bt_case_free(&c);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(named_lines), cmocka_unit_test(way_of_a_programme),
-                                       cmocka_unit_test(a_bridle_starts_taut),
-                                       cmocka_unit_test(the_first_waypoint_gives_the_course)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

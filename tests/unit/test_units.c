@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Units: what is read, what is refused, and that writing keeps every bit.
+#include "test.h"
 #include "base/units.h"
 
 #include "bergtow/base.h"
 
 #include <float.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <string.h>
-#include <cmocka.h>
 
-static void reads_units_of_each_kind(void **state)
+TEST(reads_units_of_each_kind)
 {
-    (void)state;
     static const struct {
         const char *text;
         bt_unit kind;
@@ -83,9 +76,8 @@ static void reads_units_of_each_kind(void **state)
     }
 }
 
-static void refuses_what_is_not_a_number_with_a_unit_of_the_kind(void **state)
+TEST(refuses_what_is_not_a_number_with_a_unit_of_the_kind)
 {
-    (void)state;
     static const struct {
         const char *text;
         bt_unit kind;
@@ -133,9 +125,8 @@ static void refuses_what_is_not_a_number_with_a_unit_of_the_kind(void **state)
 }
 
 // Every message fits its buffer, however long the text: the buffer's last byte stays a terminator.
-static void long_texts_give_short_messages(void **state)
+TEST(long_texts_give_short_messages)
 {
-    (void)state;
     char text[5000], why[BT_WHY];
     double value;
     for (int kind = 0; kind < BT_UNIT_KINDS; kind++)
@@ -155,9 +146,8 @@ static uint64_t random_bits(void)
     return s;
 }
 
-static void written_values_read_back_to_the_same_bits(void **state)
+TEST(written_values_read_back_to_the_same_bits)
 {
-    (void)state;
     static const double edges[] = {0.0, -0.0,    DBL_MAX,     DBL_MIN, DBL_TRUE_MIN,
                                    0.1, 1.0 / 3, BT_PI / 180, 1e22,    0.30000000000000004};
     for (int i = 0; i < 20000; i++) {
@@ -174,9 +164,8 @@ static void written_values_read_back_to_the_same_bits(void **state)
     }
 }
 
-static void short_values_are_written_short(void **state)
+TEST(short_values_are_written_short)
 {
-    (void)state;
     char text[64];
     bt_units_format(0.1, BT_UNIT_TIME, text, sizeof text);
     assert_string_equal(text, "0.1 s");
@@ -186,14 +175,4 @@ static void short_values_are_written_short(void **state)
     assert_string_equal(text, "none");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reads_units_of_each_kind),
-        cmocka_unit_test(refuses_what_is_not_a_number_with_a_unit_of_the_kind),
-        cmocka_unit_test(long_texts_give_short_messages),
-        cmocka_unit_test(written_values_read_back_to_the_same_bits),
-        cmocka_unit_test(short_values_are_written_short),
-    };
-    return cmocka_run_group_tests_name("units", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

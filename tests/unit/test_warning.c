@@ -3,9 +3,6 @@
 #include "scene.h"
 
 #include <float.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "case/warning.h"
 
@@ -18,9 +15,8 @@ static char *json_of(const bt_errors *list)
     return j.text;
 }
 
-static void values_follow_from_the_conversions(void **state)
+TEST(values_follow_from_the_conversions)
 {
-    (void)state;
     bt_errors list = {0};
     bt_warn(&list, BT_WARN_UNCONVERGED, "%lld of %ld steps, 100 %% (%.2g m/s, %+.1f m/s); %s", 3LL, 4L, 0.123456789,
             -2.5, "wording");
@@ -42,9 +38,8 @@ static void values_follow_from_the_conversions(void **state)
     bt_errors_free(&list);
 }
 
-static void what_a_text_rounds_is_added(void **state)
+TEST(what_a_text_rounds_is_added)
 {
-    (void)state;
     bt_errors list = {0};
     bt_warn(&list, BT_WARN_STOPPED, "stopped");
     bt_warn_name(&list, "by", "a signal");
@@ -56,9 +51,8 @@ static void what_a_text_rounds_is_added(void **state)
 }
 
 /// 40 warnings of two lists, moved: more than a list has room for at first.
-static void codes_move_with_their_texts(void **state)
+TEST(codes_move_with_their_texts)
 {
-    (void)state;
     bt_errors a = {0}, b = {0};
     for (int i = 0; i < 40; i++) bt_warn(i % 2 ? &a : &b, i % 2 ? BT_WARN_OVERLAP : BT_WARN_OUTRUN, "%d", i);
     bt_errors_add(&a, "plain");
@@ -77,12 +71,4 @@ static void codes_move_with_their_texts(void **state)
     bt_errors_free(&b);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_follow_from_the_conversions),
-        cmocka_unit_test(what_a_text_rounds_is_added),
-        cmocka_unit_test(codes_move_with_their_texts),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

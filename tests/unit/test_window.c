@@ -2,7 +2,6 @@
 // The moving window floe by floe: what comes back, when, where, what waits for what, and what is counted.
 #include "scene.h"
 
-#include <stdlib.h>
 
 #include "bergtow/outline.h"
 #include "space/cells.h"
@@ -77,9 +76,8 @@ static void run_until_rear(bt_world *w, double rear)
 
 /// Twelve floes in three rows; disturbed once, they are back to the bit after a lap, each renewed once a lap, either
 /// way along x.
-static void come_back_as_they_were(void **state)
+TEST(come_back_as_they_were)
 {
-    (void)state;
     for (double sign = -1; sign <= 1; sign += 2) {
         bt_world *w = empty(0.1);
         enum { N = 12 };
@@ -123,9 +121,8 @@ static void come_back_as_they_were(void **state)
 
 /// Floe 1 lies on the place of floe 0 and leaves it when its own home at `other` is passed; floe 0 waits until then, or
 /// beyond the front zone goes round as it is while its place stays empty.
-static void wait_for_a_place(void **state)
+TEST(wait_for_a_place)
 {
-    (void)state;
     for (int late = 0; late < 2; late++) {
         bt_world *w = empty(0.1);
         const double other = late ? 20 : 10;
@@ -164,9 +161,8 @@ static void wait_for_a_place(void **state)
 
 /// Three floes in a ring, each on the place of the next, homes passed in one stride: they go at once. With a fourth on
 /// the place of one of them, whose home is not passed, all three wait.
-static void rings_go_at_once(void **state)
+TEST(rings_go_at_once)
 {
-    (void)state;
     for (int blocked = 0; blocked < 2; blocked++) {
         bt_world *w = empty(0.1);
         const double x[3] = {4.2, 5.9, 5.0}, y[3] = {0, 0, 2};
@@ -190,9 +186,8 @@ static void rings_go_at_once(void **state)
 
 /// A floe may lie in the bay of another's place, which is then free: shapes that are not convex are held against each
 /// other by their parts.
-static void bays_are_free(void **state)
+TEST(bays_are_free)
 {
-    (void)state;
     for (int deep = 0; deep < 2; deep++) {
         bt_world *w = empty(0.1);
         double v[16] = {-3, -3, 3, -3, 3, 3, 2, 3, 2, -2, -2, -2, -2, 3, -3, 3}; // a U, 4 m wide inside
@@ -215,9 +210,8 @@ static void bays_are_free(void **state)
 
 /// A floe that the body carries along is never taken away from it; its place is missed once a lap. One that is pushed
 /// ahead by 10 m is renewed all the same, 5 m late.
-static void carried_along(void **state)
+TEST(carried_along)
 {
-    (void)state;
     bt_world *w = empty(0.1);
     add_floe(w, 10, 0, 0);
     add_floe(w, 12, 5, 0);
@@ -242,9 +236,8 @@ static void carried_along(void **state)
 
 /// Current: the mother field drifts with the water, what enters rests in it to the last bit. Wind: it drifts as its
 /// mean floe does, so that equal floes keep their distances whether renewed or not.
-static void drifts_as_undisturbed_ice(void **state)
+TEST(drifts_as_undisturbed_ice)
 {
-    (void)state;
     for (int wind = 0; wind < 2; wind++) {
         bt_world *w = empty(0.1);
         w->par.water_u = 0.1;
@@ -272,9 +265,8 @@ static void drifts_as_undisturbed_ice(void **state)
 }
 
 /// A body that goes back leaves the window where it is, and the window goes on when the body has its place again.
-static void does_not_go_back(void **state)
+TEST(does_not_go_back)
 {
-    (void)state;
     bt_world *w = empty(0.1);
     for (int k = 0; k < 8; k++) add_floe(w, 1 + 5 * k, 0, 0);
     add_body_and_window(w, 1, speed);
@@ -294,9 +286,8 @@ static void does_not_go_back(void **state)
 /// Two floes that nearly touch are put at their places: they have the velocity of the undisturbed ice, know of no
 /// contact, and are looked at as after a blow. Two others are left alone. A home a rounding below the period's rim is
 /// on the rim.
-static void put_as_new(void **state)
+TEST(put_as_new)
 {
-    (void)state;
     bt_world *w = empty(0.1);
     const double x[4] = {0, 1.25, 30, 31.25};
     for (int k = 0; k < 4; k++) add_floe(w, x[k], 0, 0);
@@ -340,9 +331,8 @@ static void put_as_new(void **state)
 }
 
 /// A floe whose place another has entered by some times the slop waits; by less than the slop it goes.
-static void no_place_upon_others(void **state)
+TEST(no_place_upon_others)
 {
-    (void)state;
     for (int deep = 0; deep < 2; deep++) {
         bt_world *w = empty(0.1);
         double v[8];
@@ -365,9 +355,8 @@ static void no_place_upon_others(void **state)
 
 /// Where walls hold the ice, the field around it does not drift across; a stride leaves most of the zone of entry as it
 /// is, however short that is.
-static void held_by_walls(void **state)
+TEST(held_by_walls)
 {
-    (void)state;
     for (int held = 0; held < 2; held++) {
         bt_params p = scene_params(0.1, 1);
         p.period_x = LENGTH;
@@ -392,9 +381,8 @@ static void held_by_walls(void **state)
 }
 
 /// What decides about the floes' way is in the hash of the state.
-static void hashed(void **state)
+TEST(hashed)
 {
-    (void)state;
     bt_world *w = empty(0.1);
     add_floe(w, 1, 0, 0);
     add_body_and_window(w, 1, speed);
@@ -414,20 +402,4 @@ static void hashed(void **state)
     bt_world_free(w);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(come_back_as_they_were),
-        cmocka_unit_test(wait_for_a_place),
-        cmocka_unit_test(rings_go_at_once),
-        cmocka_unit_test(bays_are_free),
-        cmocka_unit_test(carried_along),
-        cmocka_unit_test(drifts_as_undisturbed_ice),
-        cmocka_unit_test(does_not_go_back),
-        cmocka_unit_test(put_as_new),
-        cmocka_unit_test(no_place_upon_others),
-        cmocka_unit_test(held_by_walls),
-        cmocka_unit_test(hashed),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)
