@@ -136,7 +136,7 @@ def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch
     assert e.complete and found == {(0.13, 20, 0, 1), (0.13, 20, -2, 0), (0.26, 10, 0, 1), (0.26, 10, -2, 0)}
 
 
-@pytest.mark.parametrize("command", ["design", "converge", "budget", "capability"])
+@pytest.mark.parametrize("command", ["design", "converge", "budget"])
 @pytest.mark.parametrize("place", ["taken", "taken/deeper"])
 def test_a_file_in_place_of_the_folder(tmp_path, command, place):
     write_case(tmp_path, CASE)
