@@ -460,7 +460,8 @@ def planned(a, case, found, began):
         end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"])
         plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     print(answer_text.plan(plan), flush=True)
-    return Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, end, a.quiet), plan | {"speed_m_s": found["speed"]}
+    work = Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, end, a.quiet)
+    return work, plan | {"speed_m_s": found["speed"]}
 
 
 def perform(a):

@@ -461,12 +461,14 @@ def context(folder, place=None, given=None, also=()):
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],
         "method": report_method.method(s, cases), "limits": report_method.limits(cases, bool(told and told["speeds"])),
-        "assumed": [replace(v, value=report_case.short(v.value)) for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
+        "assumed": [replace(v, value=report_case.short(v.value)) for v in values
+                    if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL + NUMERICAL)
                     and any(report_run.applies(v.key, r[2]) for r in runs)],
         "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results, told), "chapters": parts(found, drawn),
-        "members": rows_of, "members_by_condition": by_condition(s), "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
+        "members": rows_of, "members_by_condition": by_condition(s),
+        "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]

@@ -244,7 +244,8 @@ def assumed(a, markdown):
              kn(r["n_per_tenth"]), "closed form" if r["by"] == "analytic" else f"{r['fields']} common fields",
              r["distribution"] or REASONS.get(r["reason"], "none stated"), r["source"]] for r in a["assumed"]]
     note = NOT_COMBINED.get(a["band"]["why_not_combined"])
-    head = ["assumed", "value (range)", "change at the low end, kN", "at the high end, kN", "for a tenth, kN", "by", "distribution", "source"]
+    head = ["assumed", "value (range)", "change at the low end, kN", "at the high end, kN", "for a tenth, kN", "by",
+            "distribution", "source"]
     return table(head, rows, markdown) + (f"\n\nNo single figure for fields and ranges: {note}." if note else "")
 
 
