@@ -40,7 +40,7 @@ def scale(values, unit):
 def short(value, digits=3):
     """A number to so many significant digits, without exponent where that can be avoided."""
     if value == 0 or not np.isfinite(value):
-        return f"{value:g}"
+        return f"{value + 0.0:g}"  # no minus zero
     if isinstance(value, AtLeast):
         return f"at least {short(float(value), digits)}"
     value = float(f"{value:.{digits - 1}e}")  # 99.96 has as many digits as 100

@@ -87,7 +87,7 @@ static void print_help(FILE *out)
           "  --list-quantities  the numbers that a run leaves: series, summary, estimates, with units and meaning; "
           "--json too\n"
           "  --version    version, revision, compiler and MPI\n"
-          "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
+          "  --help       this text; bergtow COMMAND --help, or bergtow help COMMAND, for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
           "6 stopped on a signal or a limit, with a checkpoint.\n",
           out);
@@ -187,6 +187,10 @@ static int bergtow(int argc, char **argv)
         return BT_ERR_USAGE;
     }
     const char *word = argv[1];
+    if (!strcmp(word, "help")) {
+        if (argc == 2) word = "--help";
+        else if (argv[2][0] != '-') return bergtow(3, (char *[]){argv[0], argv[2], "--help", NULL});
+    }
     const int command = command_of(word);
     if (command >= 0) return first || commands[command].parallel ? start(command, argc - 1, argv + 1) : BT_OK;
     if (!first) return BT_OK; // what follows concerns the console

@@ -183,9 +183,29 @@ static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice
 
 static const double THIN = 0.1; // m, at full scale, assumed
 
+static const double FAR = 10; // times the range of the literature: more than its ice differs, assumed
+
+/// Toughness and strength far from the literature: a number without k, or in another unit.
+static void warn_strength(const bt_case *c, bt_errors *warnings)
+{
+    const struct {
+        const char *key, *unit;
+        double value, least, most, usual;
+    } known[] = {{"ice.splitting.toughness", "kPa m^0.5", c->ice.splitting.toughness, 50e3, 250e3, 150e3},
+                 {"ice.splitting.strength", "kPa", c->ice.splitting.strength, 200e3, 500e3, 300e3}};
+    for (int k = 0; k < 2; k++)
+        if (known[k].value < known[k].least / FAR || known[k].value > known[k].most * FAR)
+            bt_warn(warnings, BT_WARN_ODD_STRENGTH,
+                    "%s: %.3g %s, where sea ice has %g to %g in the literature; check the unit, as in %g %s",
+                    known[k].key, known[k].value / 1e3, known[k].unit, known[k].least / 1e3, known[k].most / 1e3,
+                    known[k].usual / 1e3, known[k].unit);
+}
+
 void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings)
 {
-    if (c->ice.splitting.toughness > 0 && thickness < THIN && c->domain.frame == BT_FRAME_GEOGRAPHIC)
+    const bool splits = c->ice.splitting.toughness > 0 && c->domain.frame == BT_FRAME_GEOGRAPHIC;
+    if (splits) warn_strength(c, warnings);
+    if (splits && thickness < THIN)
         bt_warn(warnings, BT_WARN_THIN_SPLITS,
                 "ice.splitting.toughness: the ice is %.3g m thick in the mean, and floes of less than 0.1 m raft or "
                 "bend before they split; set ice.rafting.kappa, or 0 here",

@@ -87,6 +87,7 @@
     ROW(SLOW_CLOSING, "slow_closing", "boundary speed_m_s floes share_m_s accepted_m_s tolerance",                     \
         "the walls close more slowly than the tolerance tells")                                                        \
     ROW(THIN_SPLITS, "thin_splits", "thickness_m", "floes that would raft or bend may split")                          \
+    ROW(ODD_STRENGTH, "odd_strength", "key value - least most", "ice is far weaker or stronger than is published")     \
     ROW(THICK_ICE, "thick_ice", "thickness_m", "the ice is thicker than is likely")                                    \
     ROW(OWN_WAKE, "own_wake", "time_s", "the body meets ice that it has opened before")                                \
     ROW(LEAVES_ICE, "leaves_ice", "time_s", "the body leaves the ice")                                                 \

@@ -397,7 +397,9 @@ def test_a_step_without_contacts_is_no_failure(folder):
 
 
 
-@pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "),
+@pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["help"], b"Usage: bergtow"),
+                                                 (["help", "resume"], b"Usage: bergtow resume"),
+                                                 (["--version"], b"bergtow "),
                                                  (["--list-keys"], b"ice.concentration"),
                                                  (["run", "--help"], b"--dump-contacts"),
                                                  (["check", "--help"], b"--set"), (["field", "--help"], b"--output")])

@@ -137,7 +137,7 @@ class Told(Run):
     case = path = events = summary = None
 
     def __init__(self, x, y=None, case=None, passed=()):
-        self._cache, self.case, self.path = {}, case or {}, "told"
+        self.case, self.path = case or {}, "told"
         self.events = [{"kind": "waypoint", "subject": k + 1, "time_s": t} for k, t in enumerate(passed)]
         self.series = {"time": np.arange(float(len(x))), "body_x": np.asarray(x, dtype=float),
                        "body_y": np.zeros(len(x)) if y is None else np.asarray(y, dtype=float)}

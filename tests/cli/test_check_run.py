@@ -394,5 +394,13 @@ def test_what_splits_the_mean_floe(tmp_path):
     basin = said(tough, case=changed(MAP, domain={"length": 2000, "width": 1000}, ice__thickness=0.05))
     assert basin["by_default"]["ice.splitting.least_size"] == pytest.approx(0.15)
     assert "thin_splits" not in [w["code"] for w in basin["warnings"]]
+    # numbers without a prefix, at full scale alone
+    def odd(*settings, **more):
+        return [w["values"] for w in said(*settings, **more)["warnings"] if w["code"] == "odd_strength"]
+    assert odd(tough) == [] and odd(("toughness", "30 kPa m^0.5"), ("strength", "2 MPa")) == []
+    assert odd(("toughness", "150"), ("strength", "300")) == [
+        {"key": f"ice.splitting.{key}", "value": n, "least": low, "most": high}
+        for key, n, low, high in (("toughness", 0.15, 50, 250), ("strength", 0.3, 200, 500))]
+    assert odd(("toughness", "150"), case=changed(MAP, domain={"length": 2000, "width": 1000})) == []
     assert "mean floe, as a square, splits under" in call("check", tmp_path / "case.yml", "--set",
                                                           "ice.splitting.toughness=150 kPa√m").stdout

@@ -124,6 +124,33 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
         assert "5 m (concentration 20 %); 20.1 m (concentration 45 %)" in page
 
 
+def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch):
+    """Red: what the study of several speeds or winds has under `with`, no --set could change."""
+    write_case(tmp_path, CASE)
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--fields", "1", "--quiet", "--no-pdf",
+                "--no-replay", "--no-load-cases", "--speeds", "0.26 m/s", "--set", "run.duration=20 s", "--set",
+                "ice.concentration=0.2", "--winds", "2 m/s", "--set", "air.wind_y=1 m/s", "--set", "ice.friction=0.1")
+    e, found = Members(tmp_path / "out"), set()
+    for m in range(e.n):
+        with Run(e.folder(m)) as run:
+            found.add(tuple(run.value(key) for key in ("tow.speed", "run.duration", "air.wind_x", "air.wind_y")))
+            assert (run.value("ice.concentration"), run.value("ice.friction")) == (0.2, 0.1)
+    assert e.complete and found == {(0.13, 20, 0, 1), (0.13, 20, -2, 0), (0.26, 10, 0, 1), (0.26, 10, -2, 0)}
+
+
+@pytest.mark.parametrize("command", ["design", "converge", "budget"])
+@pytest.mark.parametrize("place", ["taken", "taken/deeper"])
+def test_a_file_in_place_of_the_folder(tmp_path, command, place):
+    write_case(tmp_path, CASE)
+    (tmp_path / "study.yml").write_text(yaml.safe_dump({"base": "case.yml", "repeats": 2, "parameters": {
+        "ice.friction": {"from": 0.1, "to": 0.3, "distribution": "uniform", "source": "assumed"}}}))
+    (tmp_path / "taken").touch()
+    result = script(command, "study.yml" if command == "budget" else "case.yml", "-o", place, cwd=tmp_path)
+    assert result.returncode == 4 and result.stderr.endswith(
+        "taken: is a file where a folder is needed; give another folder with -o DIR\n"), result.stderr
+
+
 def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
     before = {p.name: p.stat().st_mtime_ns for p in made.iterdir()}
     a = cli.arguments("design", str(made.parent / "case.yml"), "-o", made)

@@ -38,7 +38,7 @@ def test_a_line_names_what_takes_long_and_nothing_else(capsys, monkeypatch):
 SHORT = changed(TOW, output=None, run__duration=8, output__window_start=4)
 
 
-@pytest.mark.parametrize("command, named", [("report", "report of out, picture: "), ("statistics", "2 members, ")])
+@pytest.mark.parametrize("command, named", [("report", "report.html, picture: "), ("statistics", "2 members, ")])
 def test_commands_that_can_take_long_say_what_they_are_at(tmp_path, command, named):
     """Each of them, with hardly any patience."""
     folder = run(tmp_path, SHORT).dir if command == "report" else made_up.write(

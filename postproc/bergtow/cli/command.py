@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Messages and exit codes in place of tracebacks."""
 import argparse
+import errno
 import os
 import signal
 import sys
+from pathlib import Path
 
 from bergtow import progress
 from bergtow.cli import lacking
@@ -63,7 +65,7 @@ def guarded(name, main):
     except ModuleNotFoundError as error:
         code = _say(name, lacking.message(error), IO)
     except OSError as error:
-        code = _say(name, error, IO)
+        code = _say(name, _of_system(error), IO)
     except KeyboardInterrupt:
         code = _say(name, "stopped", SIGNAL)
     except SystemExit as end:
@@ -74,6 +76,17 @@ def guarded(name, main):
                     "the end; every file is written", IO)
     if code:
         sys.exit(code)
+
+
+def _of_system(error):
+    """An error of the system with its path and a remedy in place of its number."""
+    if error.filename is None:
+        return error.strerror or error
+    path = Path(os.fsdecode(error.filename))
+    if error.errno in (errno.EEXIST, errno.ENOTDIR):
+        path = next((part for part in (*reversed(path.parents), path) if part.is_file()), path)
+        return f"{path}: is a file where a folder is needed; give another folder with -o DIR"
+    return f"{path}: {error.strerror}; check the path, and who may read and write there"
 
 
 def _say(name, message, code):

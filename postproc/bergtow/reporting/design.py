@@ -41,7 +41,7 @@ from bergtow.result.run import Run
 from bergtow.study import analysis, answer, assumed, domain_width, gear, load_cases
 from bergtow.study.case_file import contents, files, is_study, says, section
 from bergtow.study.domain_width import read_ice_of, reads_ice
-from bergtow.study.runs import CaseRuns, locked, run_members
+from bergtow.study.runs import WARNING, CaseRuns, locked, run_members
 from bergtow.text import answer as answer_text
 
 import numpy as np
@@ -78,7 +78,10 @@ class Work:
 
     def ensemble(self, study):
         """Run the members that are not there yet. True when all have settled. Errors: RunError."""
-        return run_members(self.program, study, self.folder, self.given, self.jobs, self.left(), self.quiet)
+        settled, said = run_members(self.program, study, self.folder, self.given, self.jobs, self.left(), self.quiet)
+        # at the limit the fields stop and the call does not; failed members are named again when all are gathered
+        sys.stderr.writelines(line for line in said.splitlines(keepends=True) if settled or line.startswith(WARNING))
+        return settled
 
 
 def title_of(case, name, values):
@@ -114,7 +117,7 @@ def at_speeds(a, found):
         keys = {"run.duration": f"{found['duration'] * own / v:.9g} s"}
         if found["window_start"] >= 0:
             keys["output.window_start"] = f"{found['window_start'] * own / v:.9g} s"
-        out[f"{v:.9g} m/s"] = {} if v == own else keys
+        out[f"{v:.9g} m/s"] = keys
     return out
 
 
@@ -147,7 +150,7 @@ def write_study(a, case, repeats, wider):
     fitting = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
     if a.by_speed:
         parameters["tow.speed"] = list(a.by_speed)
-        fitting |= {f"tow.speed={text}": keys for text, keys in a.by_speed.items() if keys}
+        fitting |= {f"tow.speed={text}": keys for text, keys in a.by_speed.items()}
     for key, some in a.varied.items():
         parameters[key] = list(some)
         fitting |= {f"{key}={text}": keys for text, keys in some.items() if keys}
@@ -228,7 +231,8 @@ def run_case(work, a, case):
         n += more
     if not whole_round:
         n = max(1, fields_settled(a.output))
-        work.end = np.inf  # nothing is left to run; the members are gathered once more
+        print(f"no time is left for further fields: the answer is from the {n} that are complete in every condition")
+        work.end, work.quiet = np.inf, True  # nothing is left to run; the members are gathered once more
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
         need = a.budget + max(0.0, (FEW - n) * rate - max(0.0, end - time.monotonic())) / 60
@@ -431,10 +435,20 @@ def ending(a, began, conditions):
     return began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
 
 
+def sets_of_study(a, asked):
+    """--set of the user's for the study, without the keys that it has by at_speeds(), varied() or, unless they are
+    asked for, as its concentration: there the values of --set stand already."""
+    some = [*a.by_speed.values(), *(keys for of in a.varied.values() for keys in of.values())]
+    there = {*a.varied, *(key for keys in some for key in keys)}
+    there |= {"tow.speed"} if a.by_speed else set()
+    there |= set() if asked else {"ice.concentration"}
+    return [text for text in a.set if text.partition("=")[0].strip() not in there]
+
+
 def planned(a, case, found, began):
     """(Work of the fields, plan): what a value takes and what the budget gives, said before the first run. Errors:
     RunError."""
-    own = answer.case_value(found["case"], "ice.concentration", 0.0)
+    own, asked = answer.case_value(found["case"], "ice.concentration", 0.0), a.concentrations
     a.concentrations = a.concentrations or ([] if reads_ice(case) else [own])
     if a.thicknesses and reads_ice(case):
         raise RunError(a.file, "reads its ice, which has the thickness of its floes", "leave --thicknesses out", CASE)
@@ -446,7 +460,8 @@ def planned(a, case, found, began):
         end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"])
         plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
     print(answer_text.plan(plan), flush=True)
-    return Work(program_path(), a.output, a.set, a.jobs, end, a.quiet), plan | {"speed_m_s": found["speed"]}
+    work = Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, end, a.quiet)
+    return work, plan | {"speed_m_s": found["speed"]}
 
 
 def perform(a):

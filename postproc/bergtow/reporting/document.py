@@ -161,9 +161,9 @@ def sources(values, estimates):
         return ", ".join(keys[:4]) + (f" and {len(keys) - 4} more" if len(keys) > 4 else "")
     return [{"kind": "heading", "text": "References"},
             lines("As the case and the program name them.", faint=True),
-            table(["source", "what is from it"], [
-                ["Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138", "method"],
-                *([source, some(keys)] for source, keys in sorted(found.items()))]),
+            {"kind": "pairs", "label": "references", "rows": [
+                ("Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138", "method"),
+                *((source, some(keys)) for source, keys in sorted(found.items()))]},
             {"kind": "heading", "text": "Symbols"}, {"kind": "pairs", "label": "symbols", "rows": SYMBOLS},
             {"kind": "heading", "text": "Standards"}, lines(STANDARDS)]
 

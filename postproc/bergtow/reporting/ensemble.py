@@ -72,7 +72,10 @@ def blocks(markdown):
         if kind == "heading":
             out += [{"kind": kind, "text": line.lstrip("# ")} for line in some]
         elif kind == "table":
-            out.append({"kind": kind, "head": cells(some[0]), "rows": [cells(line) for line in some[2:]]})
+            head, *rows = (cells(line) for k, line in enumerate(some) if k != 1)
+            if head[:2] == ["condition", "load"]:  # rows go by the load: on a page its cell spans them
+                head, *rows = ([row[1], row[0], *row[2:]] for row in (head, *rows))
+            out.append({"kind": kind, "head": head, "rows": rows})
         else:
             warned = [line[len(WARNED):] for line in some if line.startswith(WARNED)]
             out.append({"kind": kind, "lines": [line for line in some if not line.startswith(WARNED)],
@@ -197,16 +200,29 @@ def members(e, s):
     by_name, out = {row["name"]: row for row in s["members"]}, []
     for m in range(e.n):
         row = by_name.get(e.name[m])
-        mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
+        n, (low, high) = (row["mean"], row["within_95"]) if row else (np.nan, (np.nan, np.nan))
+        mean, interval = report_run.with_interval(n, low, high)
         warned = e.warnings(m) if e.status[m] == FINISHED else []
         out.append({
             "name": e.name[m], "condition": unbroken(labels[e.condition[m]]), "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
-            "doubts": ", ".join(sorted(e.doubts(m))),
+            "mean_ice_resistance_n": n, "low_95_n": low, "high_95_n": high, "doubts": ", ".join(sorted(e.doubts(m))),
             "kinds": {kind_of(w): scrubbed(w["text"]) for w in reversed(warned)},
             "reported": [scrubbed(w) for w in [e.reason[m], *(w["text"] for w in warned)] if w]
         })
     return out
+
+
+def by_condition(s):
+    """Blocks of a table with a row for each condition, in place of one for each of its members."""
+    rows = []
+    for c in s["conditions"]:
+        r, m = c["resistance"], c["members"]
+        mean, interval = report_run.with_interval(r["mean"], *r["t_95"]) if r["n"] else ("–", "–")
+        doubts = [f"{n} {kind}" for kind, n in (m["doubts"] | {k: m[k] for k in ("failed", "waiting")}).items() if n]
+        rows.append([unbroken(c["label"]), str(r["n"]), mean, interval, report_run.force(r.get("max")),
+                     ", ".join(doubts) or "none"])
+    return [table(["condition", "n", "mean ice resistance", "95 % interval", "largest of a member", "doubts"], rows)]
 
 
 def kinds_of_warnings(some):
@@ -352,7 +368,7 @@ def first_runs(e, s):
 def varied(e, runs):
     """Values of all conditions, those of first_runs(); of a parameter its range, of what else differs between
     conditions, each value and each origin with its conditions."""
-    words = {"ice.seed": "varied"}
+    words = {"ice.seed": "varied", "run.title": "that of the study, with condition and field"}
     for key, some in e.parameters.items():
         if len(set(some.tolist())) > 1:
             factor, unit = reading(key, e.units[key])
@@ -362,7 +378,7 @@ def varied(e, runs):
         return "; ".join(loads_text.qualified(loads_text.shared([(c, text(v)) for (c, *_), v in zip(runs, some)])))
     def of_all(some):
         kinds = {v.kind for v in some}
-        return replace(some[0], value=words.get(some[0].key) or together(some, lambda v: report_case.short(v.value)),
+        return replace(some[0], value=words.get(some[0].key) or together(some, lambda v: report_case.short(v.value, 6)),
                        kind=some[0].kind if len(kinds) == 1 else "study",
                        origin=together(some, lambda v: scrubbed(v.origin)))
     return [of_all(some) for some in zip(*(values for _, values, *_ in runs))]
@@ -445,12 +461,14 @@ def context(folder, place=None, given=None, also=()):
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],
         "method": report_method.method(s, cases), "limits": report_method.limits(cases, bool(told and told["speeds"])),
-        "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
+        "assumed": [replace(v, value=report_case.short(v.value)) for v in values
+                    if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL + NUMERICAL)
                     and any(report_run.applies(v.key, r[2]) for r in runs)],
         "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results, told), "chapters": parts(found, drawn),
-        "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
+        "members": rows_of, "members_by_condition": by_condition(s),
+        "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]

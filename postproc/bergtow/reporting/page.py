@@ -23,16 +23,27 @@ from bergtow.study import analysis
 import jinja2
 
 PAGE = Path(__file__).resolve().parent / "page"
+#: columns of members.csv
+MEMBER = "name", "condition", "seed", "status", "mean_ice_resistance_n", "low_95_n", "high_95_n", "doubts"
 MOST_OF_TITLE = 80  #: letters in the running head
 
 
 def templates():
     """The template engine; a name that is missing in the context is an error, not an empty text."""
-    return jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE),
-                              autoescape=True,
-                              undefined=jinja2.StrictUndefined,
-                              trim_blocks=True,
-                              lstrip_blocks=True)
+    engine = jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True,
+                                undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    engine.filters["by_name"] = by_name
+    return engine
+
+
+def by_name(rows):
+    """[(first cell, rows)] of a table, where a first cell that is empty or repeated belongs to the row above."""
+    out = []
+    for row in rows:
+        if not out or row[0] not in ("", out[-1][0]):
+            out.append((row[0], []))
+        out[-1][1].append(row)
+    return out
 
 
 def script():
@@ -114,7 +125,7 @@ def perform(a):
 
 
 def pages(folder, paths, given, also, size, compressed):
-    """{path: text} of the report of a folder, as HTML or, for a PDF, as that which is printed. Errors: RunError."""
+    """({path: text}, members) of the report of a folder, as HTML or, for a PDF, as it is printed. Errors: RunError."""
     # the second alone: it has only just begun
     if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         from bergtow.reporting import ensemble as report_ensemble  # not for a run: it loads the statistics
@@ -127,19 +138,25 @@ def pages(folder, paths, given, also, size, compressed):
             if not len(run["time"]):
                 raise RunError(folder, "has made no step to report on", "go on with it: bergtow resume")
             template, context = "run.html", report_run.context(run, 1e6 * size, compressed, given)
-    return {path: render(template, context, path.suffix.lower() == ".pdf") for path in paths}
+    return {path: render(template, context, is_pdf(path)) for path in paths}, context.get("members", [])
+
+
+def is_pdf(path):
+    return path.suffix.lower() == ".pdf"
 
 
 def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True, force=False):
     """The report of a folder in one or more files. given: {name: text or None} of the title block; also: folders of
     analyses; size: MB of the replay's data. Errors: RunError."""
     given = dict.fromkeys(TITLE_BLOCK) | (given or {})
-    with progress.doing(f"report of {folder.name or folder}"):
-        made = pages(folder, paths, given, also, size, compressed)
+    with progress.doing(paths[0].name):
+        made, members = pages(folder, paths, given, also, size, compressed)
     for path, text in made.items():
-        if path.suffix.lower() == ".pdf":
+        if is_pdf(path):
             with progress.doing(path.name):
                 pdf.write(text, path, force)
+            if members:  # on paper a condition has one row
+                writing.write_csv([{k: m[k] for k in MEMBER} for m in members], path.with_name("members.csv"), force)
         else:
             writing.write_text(text, path, force)
         print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -307,14 +307,14 @@ def stamp(run):
 
 def applies(key, case):
     """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape,
-    one of walls beside walls, one of crushing where ice is crushed."""
+    one of walls beside walls, one of crushing or splitting where ice is crushed or splits."""
     if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
         return False
     edges = {case.get("domain.ends"), case.get("domain.sides")}
     if key.startswith("domain.wall_") and "wall" not in edges or key == "domain.ahead" and "moving" not in edges:
         return False
-    if key.startswith("ice.crushing.") and key != "ice.crushing.pressure" and not case_value(
-            case, "ice.crushing.pressure", 0.0) > 0:
+    if any(key.startswith(law.rpartition(".")[0]) and key != law and not case_value(case, law, 0.0) > 0
+           for law in ("ice.crushing.pressure", "ice.splitting.toughness")):
         return False
     return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
 

@@ -57,6 +57,7 @@ class Condition:
 
     index: int            #: from 0
     values: dict          #: {key: number or text}
+    varied: list          #: of the keys those that differ between conditions, all where none does
     units: dict           #: {key: unit}
     members: np.ndarray   #: rows of all its members
     finished: np.ndarray  #: rows of those that finished with a mean and are not excluded
@@ -66,7 +67,7 @@ class Condition:
 
     @property
     def label(self):
-        return ", ".join(worded(key, value, self.units[key]) for key, value in self.values.items()) or "the case"
+        return ", ".join(worded(key, self.values[key], self.units[key]) for key in self.varied) or "the case"
 
 
 def reading(key, unit):
@@ -423,6 +424,7 @@ class Members:
     def conditions(self):
         """Every Condition, in the order of the study."""
         used, out = set(self.used.tolist()), []
+        varied = [key for key, column in self.parameters.items() if len(set(column.tolist())) > 1]
         for index in np.unique(self.condition):
             rows = np.flatnonzero(self.condition == index)
             first = rows[0]
@@ -431,7 +433,8 @@ class Members:
                 for key, column in self.parameters.items()
             }
             out.append(
-                Condition(int(index), values, self.units, rows, np.array([m for m in rows if m in used], dtype=int),
+                Condition(int(index), values, varied or list(values), self.units, rows,
+                          np.array([m for m in rows if m in used], dtype=int),
                           int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)),
                           sum(int(m) in self._dropped for m in rows)))
         return out

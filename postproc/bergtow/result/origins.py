@@ -196,7 +196,7 @@ def values(run):
             origin = "set by the study" + (f": {study[key]}" if study[key] else "; no source stated")
         elif key in given:
             kind = classify(given[key][1]) or "given"
-            origin = given[key][1] or "given in the case file; no source stated"
+            origin = given[key][1] or "no source stated"
         else:
             kind, origin = of_default(meaning)
         out.append(Value(key, value, meaning, kind, origin))
@@ -225,15 +225,19 @@ def scrubbed(text):
     return re.sub(r"(?<![\w./])(?:~|\.\.?)?/(?:[^\s/:'\"]+/)+([^\s/:'\"]*)", r"\1", text)
 
 
-def short(value):
-    """A value as the resolved case has it, with six digits in place of all; what rounding left of zero is zero. Angles,
-    which it has in radians, are in degrees, as the keys ask for them."""
+def short(value, digits=4):
+    """A value as the resolved case has it, with four digits in place of all; what rounding left of zero is zero.
+    Angles, which it has in radians, are in degrees, as the keys ask for them."""
     value = re.sub(r"(?<![\w.])(-?\d+\.?\d*(?:e[-+]?\d+)?) rad\b",
-                   lambda found: f"{np.degrees(float(found[1])):.6g} deg", value)
-    def digits(found):
+                   lambda found: f"{np.degrees(float(found[1])):.{digits}g} deg", value)
+    def rounded(found):
         number = float(found[0])
-        return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"
-    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", digits, value)
+        if abs(number) < ZERO:
+            return "0"
+        if len(found[0]) < digits + 2:
+            return found[0]
+        return f"{number:.0f}" if 10 ** digits <= abs(number) < 1e6 else f"{number:.{digits}g}"
+    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", rounded, value)
 
 
 def preface(text):

@@ -15,6 +15,7 @@ the reason and the remedy.
 import json
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import h5py
@@ -175,7 +176,7 @@ class Run:
         self.result = self.path / "result.h5"
         self.summary = self._read_summary(self.path / "summary.json")
         self._file = self._open()
-        self._cache = {}
+        self._series = {}
         self.attributes = {k: plain(v) for k, v in self._file.attrs.items()}
 
     def close(self):
@@ -236,11 +237,6 @@ class Run:
         data = np.asarray(data)
         return data.astype(float) if data.dtype.kind == "f" else data
 
-    def _once(self, key, make):
-        if key not in self._cache:
-            self._cache[key] = make()
-        return self._cache[key]
-
     # ---- series
 
     @property
@@ -254,13 +250,13 @@ class Run:
 
     def __getitem__(self, name):
         """Series [S], float64, in units(name)."""
-        def read():
+        if name not in self._series:
             data = self._read(f"series/{name}", ndim=1).astype(float)
             if len(data) != self._dataset("series/time").shape[0]:
                 raise RunError(self.result, f"/series/{name} is not as long as /series/time",
                                "the file is damaged: run the case again")
-            return data
-        return self._once(("series", name), read)
+            self._series[name] = data
+        return self._series[name]
 
     def units(self, name):
         """Units of a series, "" when the file gives none."""
@@ -323,7 +319,7 @@ class Run:
         ways = np.diff(np.array([(self.value("body.x", 0.0), self.value("body.y", 0.0)), *pairs], dtype=float), axis=0)
         return ways / np.hypot(*ways.T)[:, None]
 
-    @property
+    @cached_property
     def way(self):
         """How far the body has come along the ordered tow [S], m, from the first sample on: sway counts nothing, and
         what drives it back counts against it.
@@ -333,18 +329,16 @@ class Run:
         longest, once the way-point is passed: a body that cuts the corner has turned by half the angle there, and one
         that is towed back is about to return.
         """
-        def find():
-            x = np.column_stack([self["body_x"], self["body_y"]])
-            along = (x - x[0]) @ self.headings.T
-            way, time = along[:, 0].copy(), self["time"]
-            for event in self.events:
-                if event["kind"] != "waypoint" or event["subject"] >= along.shape[1]:
-                    continue
-                leg = along[:, event["subject"]]
-                k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before it
-                way[k:] = leg[k:] + np.maximum.accumulate(way[k:] - leg[k:])
-            return way
-        return self._once("way", find)
+        x = np.column_stack([self["body_x"], self["body_y"]])
+        along = (x - x[0]) @ self.headings.T
+        way, time = along[:, 0].copy(), self["time"]
+        for event in self.events:
+            if event["kind"] != "waypoint" or event["subject"] >= along.shape[1]:
+                continue
+            leg = along[:, event["subject"]]
+            k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before it
+            way[k:] = leg[k:] + np.maximum.accumulate(way[k:] - leg[k:])
+        return way
 
     def made_good(self, start, end):
         """Mean speed of the body over ground along the ordered tow between two times, m/s; negative where it is driven
@@ -405,17 +399,15 @@ class Run:
         """Are means and peaks of the loads over the window lower bounds, since steps in it have no solution?"""
         return self.number("window.no_load_share", 0.0) > 0
 
-    @property
+    @cached_property
     def events(self):
         """What happened in the run, in order: [{"time_s", "kind", "subject", "value"}], kinds and numbers as /events of
         result.h5 has them. summary.json has the first 40; they are taken where the file has none."""
-        def read():
-            if "events/kind_names" not in self._file:
-                return list(self.summary.get("events") or [])
-            names = [plain(name) for name in self._read("events/kind_names")]
-            rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
-            return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
-        return self._once("events", read)
+        if "events/kind_names" not in self._file:
+            return list(self.summary.get("events") or [])
+        names = [plain(name) for name in self._read("events/kind_names")]
+        rows = zip(*(self._read(f"events/{column}") for column in ("time", "kind", "subject", "value")))
+        return [{"time_s": float(t), "kind": names[k], "subject": int(s), "value": float(v)} for t, k, s, v in rows]
 
     @property
     def adrift(self):
@@ -429,23 +421,20 @@ class Run:
 
     # ---- case
 
-    def _text(self, name):
-        return self._once(name, lambda: str(plain(self._read(name)[()])))
-
-    @property
+    @cached_property
     def case_text(self):
         """Text of the case file as it was given."""
-        return self._text("case_as_given" if "case_as_given" in self._file else "case")
+        return str(plain(self._read("case_as_given" if "case_as_given" in self._file else "case")[()]))
 
-    @property
+    @cached_property
     def resolved_text(self):
         """Text of the resolved case, as in case.resolved.yml: every key with its unit, meaning and source."""
-        return self._text("case")
+        return str(plain(self._read("case")[()]))
 
-    @property
+    @cached_property
     def case(self):
         """{"section.key": text} of the resolved case: every key, numbers with their units."""
-        return self._once("resolved", lambda: parse_case(self.resolved_text))
+        return parse_case(self.resolved_text)
 
     def value(self, key, default=np.nan):
         """Number of a case key in SI units and radians; default where it is missing or no number."""
@@ -465,19 +454,17 @@ class Run:
             raise RunError(self.result, "has no /xdmf", "the file is incomplete: run the case again")
         return {name: plain(value) for name, value in node.attrs.items()}
 
-    @property
+    @cached_property
     def box(self):
         """(x0, x1, y0, y1) m of the domain; from the floes of the first frame when the case does not say."""
-        def find():
-            length, width = self.value("domain.length"), self.value("domain.width")
-            x0 = self.value("domain.x0", -length / 2 if self.geographic else 0.0)
-            y0 = self.value("domain.y0", -width / 2)
-            box = np.array([x0, x0 + length, y0, y0 + width])
-            if np.isfinite(box).all():
-                return tuple(box)
-            points = self._world(self.pose(0)) if self.n_floes else self.body_polygons(0)[0]
-            return (*_extent(points[:, 0]), *_extent(points[:, 1]))
-        return self._once("box", find)
+        length, width = self.value("domain.length"), self.value("domain.width")
+        x0 = self.value("domain.x0", -length / 2 if self.geographic else 0.0)
+        y0 = self.value("domain.y0", -width / 2)
+        box = np.array([x0, x0 + length, y0, y0 + width])
+        if np.isfinite(box).all():
+            return tuple(box)
+        points = self._world(self.pose(0)) if self.n_floes else self.body_polygons(0)[0]
+        return (*_extent(points[:, 0]), *_extent(points[:, 1]))
 
     @property
     def period(self):
@@ -489,42 +476,36 @@ class Run:
     # ---- floes and bodies
 
     def _outlines(self, group):
-        def read():
-            vertices = self._read(f"{group}/vertices", ndim=2)
-            offsets = self._read(f"{group}/offsets", ndim=1).astype(np.int64)
-            sound = (vertices.shape[1] == 2 and len(offsets) > 0 and offsets[0] == 0
-                     and offsets[-1] == len(vertices) and (np.diff(offsets) > 0).all())
-            if not sound:
-                raise RunError(self.result, f"/{group}/offsets does not fit /{group}/vertices",
-                               "the file is damaged: run the case again")
-            return vertices, offsets
-        return self._once(("outlines", group), read)
+        vertices = self._read(f"{group}/vertices", ndim=2)
+        offsets = self._read(f"{group}/offsets", ndim=1).astype(np.int64)
+        sound = (vertices.shape[1] == 2 and len(offsets) > 0 and offsets[0] == 0
+                 and offsets[-1] == len(vertices) and (np.diff(offsets) > 0).all())
+        if not sound:
+            raise RunError(self.result, f"/{group}/offsets does not fit /{group}/vertices",
+                           "the file is damaged: run the case again")
+        return vertices, offsets
 
+    @cached_property
     def _floes(self):
         """Outlines of the floes and of the pieces of floes that split, which are floes like any other."""
         vertices, offsets = self._outlines("floes")
         if not self.n_pieces:
             return vertices, offsets
-        def joined():
-            more, ends = self._outlines("pieces")
-            return np.concatenate([vertices, more]), np.concatenate([offsets, offsets[-1] + ends[1:]])
-        return self._once("floes", joined)
+        more, ends = self._outlines("pieces")
+        return np.concatenate([vertices, more]), np.concatenate([offsets, offsets[-1] + ends[1:]])
 
-    @property
+    @cached_property
     def n_pieces(self):
         """Pieces of floes that split: the last so many of the floes. Poses and forces of a floe are NaN in frames in
         which it is not there: before it was a piece, or after it has split."""
-        return self._once("pieces", lambda: len(self._file["pieces/area"]) if "pieces" in self._file else 0)
+        return len(self._file["pieces/area"]) if "pieces" in self._file else 0
 
-    @property
+    @cached_property
     def splits(self):
         """Floes that split: dict of columns [S], "time" s, "parent", "generation", "mode", "ratio", "thickness" m, and
         "crack" [S, 4] m, x and y of its ends; empty where floes do not split. Split k made the floes
         n_floes - n_pieces + 2 k and the one after it."""
-        group = self._file.get("splits")
-        if group is None:
-            return {}
-        return self._once("splits", lambda: {name: self._read(f"splits/{name}") for name in group})
+        return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
 
     @property
     def generation(self):
@@ -537,48 +518,42 @@ class Run:
     @property
     def vertices(self):
         """[V, 2] m, outlines of all floes one after the other, body frame."""
-        return self._floes()[0]
+        return self._floes[0]
 
     @property
     def offsets(self):
         """[N+1], floe i owns vertices[offsets[i]:offsets[i+1]]."""
-        return self._floes()[1]
+        return self._floes[1]
 
     @property
     def n_floes(self):
         return len(self.offsets) - 1
 
-    @property
+    @cached_property
     def thickness(self):
         """[N] m."""
-        def read():
-            own = self._read("floes/thickness", ndim=1)
-            return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
-        return self._once("thickness", read)
+        own = self._read("floes/thickness", ndim=1)
+        return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
 
-    @property
+    @cached_property
     def area(self):
         """[N] m²."""
-        def read():
-            own = self._read("floes/area", ndim=1)
-            return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
-        return self._once("area", read)
+        own = self._read("floes/area", ndim=1)
+        return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
 
-    @property
+    @cached_property
     def bodies(self):
         """List of Body: whatever is not a floe, in the order of body_pose; empty when there is none."""
-        def read():
-            if "bodies" not in self._file:
-                return []
-            vertices, offsets = self._outlines("bodies")
-            n = len(offsets) - 1
-            names = [str(plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
-            towed = int(np.ravel(self._read("bodies/towed"))[0])
-            if len(names) != n or not -1 <= towed < n:
-                raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
-                               "the file is damaged: run the case again")
-            return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], i == towed) for i in range(n)]
-        return self._once("bodies", read)
+        if "bodies" not in self._file:
+            return []
+        vertices, offsets = self._outlines("bodies")
+        n = len(offsets) - 1
+        names = [str(plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
+        towed = int(np.ravel(self._read("bodies/towed"))[0])
+        if len(names) != n or not -1 <= towed < n:
+            raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
+                           "the file is damaged: run the case again")
+        return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], i == towed) for i in range(n)]
 
     @property
     def towed(self):
@@ -595,17 +570,17 @@ class Run:
                            f"{meaning}: run a case with a towed body and impact.conversion other than none")
         return {**{k: plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
 
-    @property
+    @cached_property
     def impacts(self):
         """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", the
         meaning of a peak."""
-        return self._once("impacts", lambda: self._group("impacts", "collisions were not told apart"))
+        return self._group("impacts", "collisions were not told apart")
 
-    @property
+    @cached_property
     def panels(self):
         """Panels of the hull: dict of "ends" [P+1, 2], "middle" and "normal" [P, 2], body frame, m; loads "mean_load",
         "max_load", ... [P] N."""
-        return self._once("panels", lambda: self._group("panels", "loads by panel were not kept"))
+        return self._group("panels", "loads by panel were not kept")
 
     @property
     def panel_series(self):
@@ -620,10 +595,10 @@ class Run:
 
     # ---- frames
 
-    @property
+    @cached_property
     def frame_times(self):
         """[T] s."""
-        return self._once("times", lambda: self._read("frames/time", ndim=1))
+        return self._read("frames/time", ndim=1)
 
     @property
     def n_frames(self):
@@ -644,13 +619,17 @@ class Run:
                            "the file is damaged: run the case again")
         return data
 
+    @cached_property
+    def _piece_end(self):
+        return self._read("frames/piece_end", ndim=1)
+
     def _of_floes(self, name, frame, others=0):
         """[N, ...] of the floes in a frame; others: bodies that follow the floes in the file."""
         own = self.n_floes - self.n_pieces
         data = self._frame(name, frame, own + others)[:own]
         if not self.n_pieces:
             return data
-        ends = self._once("piece_end", lambda: self._read("frames/piece_end", ndim=1))
+        ends = self._piece_end
         k = frame % self.n_frames
         rows = slice(int(ends[k - 1]) if k else 0, int(ends[k]))
         out = np.full((self.n_floes, *data.shape[1:]), np.nan)
@@ -709,13 +688,11 @@ class Run:
         return np.stack([np.repeat(pose[:, 0], counts) + c * v[:, 0] - s * v[:, 1],
                          np.repeat(pose[:, 1], counts) + s * v[:, 0] + c * v[:, 1]], axis=1)
 
-    @property
+    @cached_property
     def _padding(self):
         """[N, M] index into vertices, outlines filled up to the longest one by repeating their last vertex."""
-        def make():
-            counts = np.diff(self.offsets)
-            return self.offsets[:-1, None] + np.minimum(np.arange(counts.max(initial=1)), counts[:, None] - 1)
-        return self._once("padding", make)
+        counts = np.diff(self.offsets)
+        return self.offsets[:-1, None] + np.minimum(np.arange(counts.max(initial=1)), counts[:, None] - 1)
 
     def polygons(self, frame, centre=None):
         """Floes of a frame in the world frame: list of N arrays [n_i, 2] m; wrapped as by wrap()."""

@@ -226,7 +226,7 @@ def _of_the_start(case, load):
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
     ramp = case.ramp if case else 0.0
     if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
-        inertia = f", of which inertia {quantity(found['inertia'], load['units'])}" if np.isfinite(
+        inertia = f", of which {100 * found['inertia'] / found['largest']:.0f} % inertia" if np.isfinite(
             found.get("inertia", np.nan)) else ""
         return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
                  "accelerates the body; a longer ramp takes less", force + inertia)]
@@ -235,8 +235,7 @@ def _of_the_start(case, load):
 
 def steps(e, rows):
     """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}). The
-    numbers of the summary are in it, which know the steps between samples and members without their folder; an earlier
-    program had those of a line without a second branch alone."""
+    numbers of the summary are in it, which know the steps between samples and members without their folder."""
     out, labels = {}, {}
     for m in rows:
         try:
@@ -247,12 +246,9 @@ def steps(e, rows):
         except RunError:
             continue
     out = {name: top for name, top in out.items() if np.isfinite(top)}
-    first, second = (f"{loads.TENSION}{k}" for k in (1, 2))
-    keys = {name: [f"window_series_{name}_{when}peak_n" for when in ("", "start_")] for name in (first, second)}
-    if set(out) <= {first}:
-        keys[first] += ["peak_line_tension_n", "start_peak_line_tension_n"]
-    for name, some in keys.items():
-        top = np.fmax.reduce(np.concatenate([_numbers(e, key, rows) for key in some]), initial=-np.inf)
+    for name in (f"{loads.TENSION}{k}" for k in (1, 2)):
+        some = [_numbers(e, f"window_series_{name}_{when}peak_n", rows) for when in ("", "start_")]
+        top = np.fmax.reduce(np.concatenate(some), initial=-np.inf)
         if np.isfinite(top):
             out[name] = max(top, out.get(name, top))
     return out, labels

@@ -9,6 +9,7 @@ The study is a Latin hypercube (`sampling`, `samples`) with separate fields for 
 converge` on the base case (`--converge FILE`, or converge.json in DIR), counted from the value of the study.
 """
 import re
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -190,7 +191,7 @@ def options(p):
 def perform(a):
     folder = a.output or Path("out") / a.study.stem
     analysis.begin("budget", a.study, "study", folder, a.force)
-    run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)
+    sys.stderr.write(run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)[1])
     e = Members(folder)
     found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
     analysis.keep("budget", found, folder, a.force)

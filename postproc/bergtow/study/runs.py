@@ -35,6 +35,7 @@ import numpy as np
 
 DONE, STOPPED, SPENT = 0, 6, "the budget is spent"  # exit codes of the program; a run that met its limit
 FRESH = 2, 3, 4  # exit codes of a resume that cannot use the files of the run
+WARNING = "bergtow: warning:"  # in front of a message of the program
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 
@@ -63,7 +64,7 @@ def digest(path):
 def errors_in(said):
     """The errors among the messages of the program, without its name."""
     return [line.removeprefix("bergtow: ") for line in said.strip().splitlines()
-            if not line.startswith("bergtow: warning:")]
+            if not line.startswith(WARNING)]
 
 
 def stopped_by_limit(code, took, limit):
@@ -286,8 +287,8 @@ def ensemble_made(folder):
 
 def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
     """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
-    long as it takes). True when all have settled: finished, or failed. Errors: RunError where the program refuses the
-    study; a member that fails is none, and the others are gathered as ever."""
+    long as it takes): whether all have settled, finished or failed, and the messages of the program. Errors: RunError
+    where the program refuses the study; a member that fails is none, and the others are gathered as ever."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
     call += [part for text in sets for part in ("--set", text)]
     limit = round(max(1.0, seconds)) if np.isfinite(seconds) else np.inf
@@ -297,9 +298,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
     code, said = Calls().run(call + ["--quiet"] * quiet, env=os.environ | ONE_THREAD)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
-    sys.stderr.write(said)
-    stopped_by_limit(code, time.monotonic() - began, limit)
-    return code != STOPPED
+    return not stopped_by_limit(code, time.monotonic() - began, limit), said
 
 
 def checked(binary, case, sets, *words):

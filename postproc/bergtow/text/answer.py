@@ -71,7 +71,7 @@ def minutes(s):
 
 
 def percent(x):
-    return f"{100 * x:.0f} %"
+    return f"{round(100 * x) + 0} %"
 
 
 # ---- the sentence
@@ -106,7 +106,7 @@ def _covers(v, a):
     why = {"no_tail": "There are too few peaks for a tail",
            "unbounded_tail": "These fields do not know the tail, whose interval has no upper bound"}[v["reason"]]
     return (f"{why}: the largest of {v['n_tows']} steady tows of "
-            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence "
+            f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence at least "
             f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
             f"{short(a['asked']['tow_hours'], 2)} h bears more")
 
@@ -244,14 +244,15 @@ def assumed(a, markdown):
              kn(r["n_per_tenth"]), "closed form" if r["by"] == "analytic" else f"{r['fields']} common fields",
              r["distribution"] or REASONS.get(r["reason"], "none stated"), r["source"]] for r in a["assumed"]]
     note = NOT_COMBINED.get(a["band"]["why_not_combined"])
-    head = ["assumed", "value (range)", "low end kN", "high end kN", "a tenth kN", "by", "distribution", "source"]
+    head = ["assumed", "value (range)", "change at the low end, kN", "at the high end, kN", "for a tenth, kN", "by",
+            "distribution", "source"]
     return table(head, rows, markdown) + (f"\n\nNo single figure for fields and ranges: {note}." if note else "")
 
 
 def speeds(a, markdown):
     rows = [[speed(s["speed_m_s"]), kn(s["needs_n"]), ends(s["needs_n"], s["interval_95"]) or "–", KINDS[s["kind"]],
              kn(s["has_n"]), s["feasible"].replace("_", " ")] for s in a["speeds"]]
-    return table(["speed", "needs kN", "95 % interval", "kind", "vessel kN", "feasible"], rows, markdown)
+    return table(["speed", "needs, kN", "95 % interval", "kind", "vessel has, kN", "feasible"], rows, markdown)
 
 
 def plan(p):
@@ -261,7 +262,7 @@ def plan(p):
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
              "nothing": "not one"}[p["gives"]]
     return (f"A design value takes some {short(p['needs_hours'], 2)} h of tow in windows: {fields}, some "
-            f"{short(p['needs_min'], 2)} min here. The budget reaches for {p['budget_fields']} fields, {gives}. "
+            f"{short(p['needs_min'], 2)} min here. The budget allows {p['budget_fields']} fields, {gives}. "
             "(Estimates: the program's own of its speed, and of how soon the ice in contact is other ice.)")
 
 

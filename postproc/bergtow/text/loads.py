@@ -279,7 +279,8 @@ def returns(s, markdown):
     if not hours:
         refused = sorted({x[kind]["refused"] for c in s["conditions"] for x in c["loads"].values() for kind in NAMES
                           if "refused" in x[kind]})
-        return "No return levels" + (f": {several(refused)}." if refused else ".")
+        more = f"; and {len(refused) - 1} more reasons" if len(refused) > 1 else ""
+        return "No return levels" + (f": {refused[0].partition(';')[0]}{more}." if refused else ".")
     head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
     rows, refused, short = [], {}, []
     for name in names(s):
