@@ -27,6 +27,7 @@ extern "C" {
 
 enum {
     BT_ROUTE_TERMS = 5,   ///< of the force: water, plough, compaction, large, rafting
+    BT_ROUTE_LARGE = 3,
     BT_ROUTE_SPEEDS = 16, ///< of a list of speeds, at most
     BT_ROUTE_MOST = 16,   ///< routes, at most
 };
