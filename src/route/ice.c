@@ -6,6 +6,14 @@
 // cell and dy in all cells to the right of it: two numbers, and one running sum along the row at the end for all
 // polygons together. Exact to rounding for any simple polygon. Rejected: clipping polygon by polygon and cell by
 // cell, the same areas at ten times the work.
+// Whole floes. The momentum of an oblique collision falls with the square of the offset. Its inverse Abel transform is
+// a hemisphere over the disc of radius (D + W)/2: one raster, whose integral along a path counts each floe by its
+// offset, whatever the heading. For floes that are not round the ellipse of their second moments is taken, assumed.
+// Rejected: D/W times the area in the swath. It makes too little of a large floe that the berg grazes.
+// Compaction is that of the ice about the berg, not in its swath: floes that are met push others. A way between floes
+// saves none of it, and it makes detours dear in dense ice. In 128 tows along any ways through ice of 40 and 50 % more
+// than half of the work did not depend on the floes near the path. The averages reach one width and one mean floe to
+// all sides, assumed.
 #include "route/ice.h"
 
 #include "base/elementary.h"
@@ -84,7 +92,7 @@ void bt_route_ice_sum(double *sums, int nx, int ny)
     }
 }
 
-/// Averages over squares of 4 W of what `sums` holds, of the part that is known; to `mean`.
+/// Averages over squares of 2 half + 1 cells of what `sums` holds, of the part that is known; to `mean`.
 static void average(const double *sums, const double *known, int nx, int ny, int half, float *mean)
 {
     const int64_t wide = nx + 1;
@@ -124,8 +132,8 @@ static double weight_of(int field, const bt_route_task *t, int64_t floe)
     }
 }
 
-/// Adds to sums [ny][nx + 2], kg/m, a floe (above) of n points v [n][2] in cells and `mass` kg/m²; w: width of the berg
-/// in cells.
+/// Adds to sums [ny][nx + 2], kg/m, what a floe adds to BT_ICE_FLOES: n points v [n][2] in cells, of `mass` kg/m²; w:
+/// width of the berg in cells.
 static void add_floe(const bt_route_ice *r, double w, double mass, int64_t n, const double *v, double *sums)
 {
     double area = 0, mx = 0, my = 0, xx = 0, xy = 0, yy = 0; // about the first point
@@ -136,6 +144,7 @@ static void add_floe(const bt_route_ice *r, double w, double mass, int64_t n, co
         xx += c * (x0 * x0 + x0 * x1 + x1 * x1) / 12, yy += c * (y0 * y0 + y0 * y1 + y1 * y1) / 12;
         xy += c * (x0 * (2 * y0 + y1) + x1 * (y0 + 2 * y1)) / 24;
     }
+    if (!(fabs(area) > 0)) return;
     mx /= area, my /= area, xx = xx / area - mx * mx, yy = yy / area - my * my, xy = xy / area - mx * my;
     const double half = (xx - yy) / 2, root = bt_hypot(half, xy), angle = 0.5 * bt_atan2(xy, half);
     const double a = 2 * sqrt(bt_max(0, (xx + yy) / 2 + root)), b = 2 * sqrt(bt_max(0, (xx + yy) / 2 - root));
@@ -160,9 +169,21 @@ static void into_cells(const bt_route_ice *r, int64_t n, const double *v, double
     for (int64_t k = 0; k < n; k++) bt_route_ice_place(r, v[2 * k], v[2 * k + 1], out + 2 * k);
 }
 
+/// Mean diameter of the floes by area, m.
+static double mean_size(const bt_route_task *t)
+{
+    double area = 0, sum = 0;
+    for (int64_t i = 0; i < t->n_floes; i++) {
+        const int64_t first = t->floe_first[i], n = t->floe_first[i + 1] - first;
+        const double a = 0.5 * fabs(bt_outline_area2((int)n, t->floe + 2 * first));
+        area += a, sum += a * sqrt(4 * a / BT_PI);
+    }
+    return area > 0 ? sum / area : 0;
+}
+
 void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t)
 {
-    const int nx = r->nx, ny = r->ny, half = (int)(2 * t->width / r->cell + 0.5);
+    const int nx = r->nx, ny = r->ny, half = (int)((t->width + mean_size(t)) / r->cell + 0.5);
     const size_t cells = (size_t)nx * (size_t)ny, padded = (size_t)(nx + 2) * (size_t)ny;
     double *sums = bt_alloc(padded, sizeof *sums), *known = bt_alloc(padded, sizeof *known), *v = NULL;
     const double *e = t->extent, corners[8] = {e[0], e[1], e[2], e[1], e[2], e[3], e[0], e[3]};

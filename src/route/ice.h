@@ -15,7 +15,7 @@ typedef struct bt_route_ice {
     double ox, oy;       ///< the frame's origin in that of the task, m
     /// [ny][nx] c; m, kg/m²; mass of whole floes taken along per metre of way of the centre, kg/m; c h², m²
     float *field[BT_ICE_FIELDS];
-    float *mean[BT_ICE_FIELDS]; ///< the same averaged over squares of 4 W
+    float *mean[BT_ICE_FIELDS]; ///< the same averaged over squares of 2 (W + D̄)
     float *load;                ///< [ny][nx][n_speeds] weighted force of the ice in a metre of width, N/m
     float *line;                ///< [ny][nx][n_speeds] weighted force of whole floes with the centre here, N
 } bt_route_ice;
