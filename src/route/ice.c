@@ -98,12 +98,12 @@ static void average(const double *sums, const double *known, int nx, int ny, int
     const int64_t wide = nx + 1;
     double *total[2] = {bt_alloc((size_t)(wide * (ny + 1)), sizeof(double)),
                         bt_alloc((size_t)(wide * (ny + 1)), sizeof(double))};
-    const double *of[2] = {sums, known};
     for (int a = 0; a < 2; a++)
         for (int j = 0; j < ny; j++) {
             double row = 0;
             for (int i = 0; i < nx; i++) {
-                row += of[a][(int64_t)j * (nx + 2) + i];
+                const int64_t k = (int64_t)j * (nx + 2) + i;
+                row += a ? known[k] : known[k] * sums[k];
                 total[a][(j + 1) * wide + i + 1] = total[a][j * wide + i + 1] + row;
             }
         }
