@@ -18,8 +18,9 @@ double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
 }
 
 /// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m²; the
-/// first *middle of them are those about its centre, and stand for lengths of the path, m. Between the middles of cells it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a
-/// turn sharper than W/2 a slice ends at its centre. Returns the number of cells.
+/// first *middle of them are those about its centre, and stand for lengths of the path, m. Between the middles of cells
+/// it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a turn sharper than W/2 a slice
+/// ends at its centre. Returns the number of cells.
 static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[CELLS], double area[CELLS],
                  int *middle)
 {
