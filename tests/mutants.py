@@ -939,8 +939,9 @@ MUTANTS = {
         ("d * bt_hypot(x, y) * (x * tx + y * ty)", "d * (x * x + y * y)", "drag of the water from every side"),
     ]),
     "src/route/ice.c": ([PLAN + "terms_of_the_force", "cli/test_route_planner.py"], [
-        ("bt_min(packed, cap) - plough", "packed - plough", "no cap by rafting"),
-        ("bt_max(0, sqrt(4 * area / BT_PI) / t->width - 1)", "0", "a wide floe counts as a narrow one"),
+        ("bt_min(near * (packed - 1), most)", "near * (packed - 1)", "no cap by rafting"),
+        ("r->mean[BT_ICE_FLOES][k] / t->width", "0", "compaction leaves out whole floes"),
+        ("bt_atan2(xy, half)", "0", "a long floe lies along the axes"),
         ("(1 + t->added_mass) * v * v", "v * v", "the water that floes take along is left out"),
     ]),
     "src/route/plan.c": ([PLAN + "routes_are_a_width_apart", "cli/test_route_planner.py"], [

@@ -5,15 +5,19 @@
 // the ground moves by −u t, u the drift of the ice. The path is that of the berg's centre, and its swath is the strip
 // of the berg's width W about it. The force F on the berg in the swath, at the speed V along the path, is per metre of
 // width, with m the mass of ice per area of sea, c the concentration, h the thickness, C the added mass coefficient of
-// floes, and averages (·)' over a square of 4 W (c too, of what is known of it):
+// floes, D̄ the mean size of floes by area, and averages (·)' over a square of 2 (W + D̄), of what is known of it:
 //     water       d |V t − u_w| (V t − u_w) · t, d = ½ ρ_w C_d A_w, u_w the water's velocity in this frame: one number
 //     plough      f1 = (1 + C) m V²: floes that the berg meets are taken up to its speed; as much again is lost
-//     compaction  f1 (1/(1 − c'/c_j) − 1): ahead of the berg ice is packed up to the cover c_j at which it jams, and
-//                 the front of that runs ahead of the berg; momentum of a piston in one dimension, an upper bound in
-//                 two; 1/(..) is at most 10, assumed
-//     large       f1 (D/W − 1) where floes are wider than the berg, of diameter D, since they move as a whole
+//     large       floes move as a whole. One of mass M, diameter D and offset b from the path takes in an oblique
+//                 collision without rebound or friction the momentum along it M V (1 − b²/ρ²), ρ = (D + W)/2; the share
+//                 D/(D + W) of it counts here, the rest being ice in the swath. The force on a berg whose centre is at
+//                 the distance r from the floe's is (1 + C) M V² D/(D + W) · 2/(π ρ²) √(ρ² − r²), whose integral along
+//                 any straight line is the work [Abel 1826]; of the ellipse of the floe's second moments
+//     compaction  (f1 + large/W)' (1/(1 − c'/c_j) − 1): floes that are met push those about them. Ahead of the berg ice
+//                 is packed up to the cover c_j at which it jams, and the front of that runs ahead of the berg;
+//                 momentum of a piston in one dimension; 1/(..) is at most 10, assumed
 //     rafting     q h² c, q = κ ½ ρ_i (1 − ρ_i/ρ_w) g, 1 wherever ice is met; of weight 0 unless it is fitted
-// Where floes raft, the sum of plough, compaction and large is at most q (h²)' [the cap of contacts that raft]. Which
+// Where floes raft, the sum of plough, compaction and large/W is at most q (h²)' [the cap of contacts that raft]. Which
 // of the terms the ice has, and how large, is assumed: weights are for fitting them to tows. The terms of a swath add
 // up along a path without counting ice twice, as slices between two normals of the path.
 #ifndef BERGTOW_ROUTE_H
@@ -27,6 +31,7 @@ extern "C" {
 
 enum {
     BT_ROUTE_TERMS = 5,   ///< of the force: water, plough, compaction, large, rafting
+    BT_ROUTE_LARGE = 3,   ///< the term that is of whole floes, not of a width
     BT_ROUTE_SPEEDS = 16, ///< of a list of speeds, at most
     BT_ROUTE_MOST = 16,   ///< routes, at most
 };

@@ -6,8 +6,17 @@
 // cell and dy in all cells to the right of it: two numbers, and one running sum along the row at the end for all
 // polygons together. Exact to rounding for any simple polygon. Rejected: clipping polygon by polygon and cell by
 // cell, the same areas at ten times the work.
+// Whole floes. The momentum of an oblique collision falls with the square of the offset. Its inverse Abel transform is
+// a hemisphere over the disc of radius (D + W)/2: one raster, whose integral along a path counts each floe by its
+// offset, whatever the heading. For floes that are not round the ellipse of their second moments is taken, assumed.
+// Rejected: D/W times the area in the swath. It makes too little of a large floe that the berg grazes.
+// Compaction is that of the ice about the berg, not in its swath: floes that are met push others. A way between floes
+// saves none of it, and it makes detours dear in dense ice. In 128 tows along any ways through ice of 40 and 50 % more
+// than half of the work did not depend on the floes near the path. The averages reach one width and one mean floe to
+// all sides, assumed.
 #include "route/ice.h"
 
+#include "base/elementary.h"
 #include "bergtow/outline.h"
 
 #include <math.h>
@@ -83,18 +92,18 @@ void bt_route_ice_sum(double *sums, int nx, int ny)
     }
 }
 
-/// Averages over squares of 4 W of what `sums` holds, of the part that is known; to `mean`.
+/// Averages over squares of 2 half + 1 cells of what `sums` holds, of the part that is known; to `mean`.
 static void average(const double *sums, const double *known, int nx, int ny, int half, float *mean)
 {
     const int64_t wide = nx + 1;
     double *total[2] = {bt_alloc((size_t)(wide * (ny + 1)), sizeof(double)),
                         bt_alloc((size_t)(wide * (ny + 1)), sizeof(double))};
-    const double *of[2] = {sums, known};
     for (int a = 0; a < 2; a++)
         for (int j = 0; j < ny; j++) {
             double row = 0;
             for (int i = 0; i < nx; i++) {
-                row += of[a][(int64_t)j * (nx + 2) + i];
+                const int64_t k = (int64_t)j * (nx + 2) + i;
+                row += a ? known[k] : known[k] * sums[k];
                 total[a][(j + 1) * wide + i + 1] = total[a][j * wide + i + 1] + row;
             }
         }
@@ -112,15 +121,47 @@ static void average(const double *sums, const double *known, int nx, int ny, int
     free(total[1]);
 }
 
-static double weight_of(int field, const bt_route_task *t, int64_t floe, double area)
+static double weight_of(int field, const bt_route_task *t, int64_t floe)
 {
     const double h = t->thickness[floe], mass = t->density * h;
     switch (field) {
     case BT_ICE_COVER: return 1;
-    case BT_ICE_MASS: return mass;
-    case BT_ICE_LARGE: return mass * bt_max(0, sqrt(4 * area / BT_PI) / t->width - 1);
+    case BT_ICE_MASS:
+    case BT_ICE_FLOES: return mass;
     default: return h * h;
     }
+}
+
+/// Adds to sums [ny][nx + 2], kg/m, what a floe adds to BT_ICE_FLOES: n points v [n][2] in cells, of `mass` kg/m²; w:
+/// width of the berg in cells.
+static void add_floe(const bt_route_ice *r, double w, double mass, int64_t n, const double *v, double *sums)
+{
+    double area = 0, mx = 0, my = 0, xx = 0, xy = 0, yy = 0; // about the first point
+    for (int64_t e = 0; e < n; e++) {
+        const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
+        const double x0 = p[0] - v[0], y0 = p[1] - v[1], x1 = q[0] - v[0], y1 = q[1] - v[1], c = x0 * y1 - x1 * y0;
+        area += c / 2, mx += c * (x0 + x1) / 6, my += c * (y0 + y1) / 6;
+        xx += c * (x0 * x0 + x0 * x1 + x1 * x1) / 12, yy += c * (y0 * y0 + y0 * y1 + y1 * y1) / 12;
+        xy += c * (x0 * (2 * y0 + y1) + x1 * (y0 + 2 * y1)) / 24;
+    }
+    if (!(fabs(area) > 0)) return;
+    mx /= area, my /= area, xx = xx / area - mx * mx, yy = yy / area - my * my, xy = xy / area - mx * my;
+    const double half = (xx - yy) / 2, root = bt_hypot(half, xy), angle = 0.5 * bt_atan2(xy, half);
+    const double a = 2 * sqrt(bt_max(0, (xx + yy) / 2 + root)), b = 2 * sqrt(bt_max(0, (xx + yy) / 2 - root));
+    const double wide = a + w / 2, high = b + w / 2, share = sqrt(a * b / (wide * high));
+    const double most = mass * fabs(area) * share * 2 / (BT_PI * sqrt(wide * high)) * r->cell;
+    double sine, cosine;
+    bt_sincos(angle, &sine, &cosine);
+    mx += v[0], my += v[1];
+    const int i0 = (int)bt_max(0, mx - wide), i1 = (int)bt_min(r->nx, mx + wide + 1);
+    const int j0 = (int)bt_max(0, my - wide), j1 = (int)bt_min(r->ny, my + wide + 1);
+    for (int j = j0; j < j1; j++)
+        for (int i = i0; i < i1; i++) {
+            const double x = i + 0.5 - mx, y = j + 0.5 - my;
+            const double along = (x * cosine + y * sine) / wide, across = (y * cosine - x * sine) / high;
+            const double inside = 1 - along * along - across * across;
+            if (inside > 0) sums[(int64_t)j * (r->nx + 2) + i] += most * sqrt(inside);
+        }
 }
 
 static void into_cells(const bt_route_ice *r, int64_t n, const double *v, double *out)
@@ -128,9 +169,21 @@ static void into_cells(const bt_route_ice *r, int64_t n, const double *v, double
     for (int64_t k = 0; k < n; k++) bt_route_ice_place(r, v[2 * k], v[2 * k + 1], out + 2 * k);
 }
 
+/// Mean diameter of the floes by area, m.
+static double mean_size(const bt_route_task *t)
+{
+    double area = 0, sum = 0;
+    for (int64_t i = 0; i < t->n_floes; i++) {
+        const int64_t first = t->floe_first[i], n = t->floe_first[i + 1] - first;
+        const double a = 0.5 * fabs(bt_outline_area2((int)n, t->floe + 2 * first));
+        area += a, sum += a * sqrt(4 * a / BT_PI);
+    }
+    return area > 0 ? sum / area : 0;
+}
+
 void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t)
 {
-    const int nx = r->nx, ny = r->ny, half = (int)(2 * t->width / r->cell + 0.5);
+    const int nx = r->nx, ny = r->ny, half = (int)((t->width + mean_size(t)) / r->cell + 0.5);
     const size_t cells = (size_t)nx * (size_t)ny, padded = (size_t)(nx + 2) * (size_t)ny;
     double *sums = bt_alloc(padded, sizeof *sums), *known = bt_alloc(padded, sizeof *known), *v = NULL;
     const double *e = t->extent, corners[8] = {e[0], e[1], e[2], e[1], e[2], e[3], e[0], e[3]};
@@ -144,11 +197,10 @@ void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t)
             const int64_t first = t->floe_first[i], n = t->floe_first[i + 1] - first;
             v = bt_realloc(v, (size_t)n, 2 * sizeof *v);
             into_cells(r, n, t->floe + 2 * first, v);
-            const double area = 0.5 * fabs(bt_outline_area2((int)n, v)) * r->cell * r->cell;
-            const double weight = weight_of(f, t, i, area);
-            if (weight > 0) bt_route_ice_add(sums, nx, ny, n, v, weight);
+            if (f == BT_ICE_FLOES) add_floe(r, t->width / r->cell, weight_of(f, t, i), n, v, sums);
+            else bt_route_ice_add(sums, nx, ny, n, v, weight_of(f, t, i));
         }
-        bt_route_ice_sum(sums, nx, ny);
+        if (f != BT_ICE_FLOES) bt_route_ice_sum(sums, nx, ny);
         r->field[f] = bt_alloc(cells, sizeof(float));
         r->mean[f] = bt_alloc(cells, sizeof(float));
         for (int j = 0; j < ny; j++)
@@ -163,31 +215,28 @@ void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t)
     free(known);
     r->n_speeds = t->n_speeds;
     r->load = bt_alloc(cells * (size_t)t->n_speeds, sizeof(float));
+    r->line = bt_alloc(cells * (size_t)t->n_speeds, sizeof(float));
     for (size_t k = 0; k < cells; k++)
         for (int s = 0; s < t->n_speeds; s++) {
             double term[BT_ROUTE_TERMS], sum = 0;
             bt_route_ice_terms(r, t, (int64_t)k, t->speed[s], term);
-            for (int a = 1; a < BT_ROUTE_TERMS; a++) sum += t->weight[a] * term[a];
+            for (int a = 1; a < BT_ROUTE_TERMS; a++) sum += a == BT_ROUTE_LARGE ? 0 : t->weight[a] * term[a];
             r->load[k * (size_t)t->n_speeds + (size_t)s] = (float)sum;
+            r->line[k * (size_t)t->n_speeds + (size_t)s] = (float)(t->weight[BT_ROUTE_LARGE] * term[BT_ROUTE_LARGE]);
         }
 }
 
 void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v, double term[BT_ROUTE_TERMS])
 {
     for (int a = 0; a < BT_ROUTE_TERMS; a++) term[a] = 0;
-    if (!(r->field[BT_ICE_MASS][k] > 0)) return;
-    const double unit = (1 + t->added_mass) * v * v, here = unit * r->field[BT_ICE_MASS][k];
-    const double cover = r->mean[BT_ICE_COVER][k], mass = r->mean[BT_ICE_MASS][k];
-    // shares of f1 where the sum is held by the cap, in this order
-    const double cap = isfinite(t->rafting) && mass > 0 && cover > 0
-                           ? t->rafting * r->mean[BT_ICE_RAFT][k] / cover / (unit * mass)
-                           : INFINITY;
+    const double unit = (1 + t->added_mass) * v * v, cover = r->mean[BT_ICE_COVER][k];
+    const double near = unit * (r->mean[BT_ICE_MASS][k] + r->mean[BT_ICE_FLOES][k] / t->width);
     const double packed = cover < t->jam_cover ? bt_min(MOST_COMPACTION, 1 / (1 - cover / t->jam_cover))
                                                : MOST_COMPACTION;
-    const double plough = bt_min(1, cap), compaction = bt_min(packed, cap) - plough;
-    term[1] = here * plough;
-    term[2] = here * compaction;
-    term[3] = bt_min(unit * r->field[BT_ICE_LARGE][k], here * bt_max(0, cap - plough - compaction));
+    double most = isfinite(t->rafting) && cover > 0 ? t->rafting * r->mean[BT_ICE_RAFT][k] / cover : INFINITY;
+    most -= term[1] = bt_min(unit * r->field[BT_ICE_MASS][k], most);
+    most -= term[2] = bt_min(near * (packed - 1), most);
+    term[BT_ROUTE_LARGE] = bt_min(unit * r->field[BT_ICE_FLOES][k], t->width * most);
     if (isfinite(t->rafting)) term[4] = t->rafting * r->field[BT_ICE_RAFT][k];
 }
 
@@ -198,4 +247,5 @@ void bt_route_ice_free(bt_route_ice *r)
         free(r->mean[f]);
     }
     free(r->load);
+    free(r->line);
 }

@@ -6,17 +6,18 @@
 #include "bergtow/route.h"
 
 /// What is kept of a cell.
-enum { BT_ICE_COVER, BT_ICE_MASS, BT_ICE_LARGE, BT_ICE_RAFT, BT_ICE_FIELDS };
+enum { BT_ICE_COVER, BT_ICE_MASS, BT_ICE_FLOES, BT_ICE_RAFT, BT_ICE_FIELDS };
 
 typedef struct bt_route_ice {
     int nx, ny, n_speeds;
     double cell, x0, y0; ///< m; its lowest corner, in the frame of the raster
     double ax, ay;       ///< the frame's x axis in that of the task, unit vector
     double ox, oy;       ///< the frame's origin in that of the task, m
-    /// [ny][nx] c; m, kg/m²; m max(0, D/W − 1), kg/m²; c h², m²
+    /// [ny][nx] c; m, kg/m²; mass of whole floes taken along per metre of way of the centre, kg/m; c h², m²
     float *field[BT_ICE_FIELDS];
-    float *mean[BT_ICE_FIELDS]; ///< the same averaged over squares of 4 W
-    float *load;                ///< [ny][nx][n_speeds] weighted force without water, N/m
+    float *mean[BT_ICE_FIELDS]; ///< the same averaged over squares of 2 (W + D̄)
+    float *load;                ///< [ny][nx][n_speeds] weighted force of the ice in a metre of width, N/m
+    float *line;                ///< [ny][nx][n_speeds] weighted force of whole floes with the centre here, N
 } bt_route_ice;
 
 /// A place of the task in cells of the raster.
@@ -31,7 +32,8 @@ static inline void bt_route_ice_place(const bt_route_ice *r, double x, double y,
 void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t);
 void bt_route_ice_free(bt_route_ice *r);
 
-/// Terms of the force per metre of width of cell k at speed v, unweighted; water stays 0.
+/// Terms of the force at cell k and speed v, unweighted, each per metre of width but that of large floes, which is of
+/// the berg with its centre there; water stays 0.
 void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v,
                         double term[BT_ROUTE_TERMS]);
 

@@ -138,6 +138,7 @@ static void make_slices(bt_lattice *l)
     l->across = bt_alloc((size_t)l->wide * (size_t)l->high * (size_t)(l->n_headings / 2) * (size_t)n_speeds,
                          sizeof *l->across);
     double(*to)[2] = bt_alloc((size_t)n, sizeof *to); // points of a slice, in cells
+    const int middle = n_across % 2 ? 1 : 2; // of each row of points, beside the path
     for (int k = 0; k < l->n_headings / 2; k++) {
         const double *u = l->unit[k];
         for (int b = 0; b < n; b++) {
@@ -153,6 +154,9 @@ static void make_slices(bt_lattice *l)
                 for (int b = 0; b < n; b++) {
                     const int64_t cell = (int64_t)(int)(y + to[b][1]) * r->nx + (int)(x + to[b][0]);
                     for (int v = 0; v < n_speeds; v++) out[v] += r->load[cell * n_speeds + v];
+                    if (abs(2 * (b % n_across) + 1 - n_across) >= 2) continue;
+                    for (int v = 0; v < n_speeds; v++)
+                        out[v] += r->line[cell * n_speeds + v] * (float)(n_across / (w * middle));
                 }
                 for (int v = 0; v < n_speeds; v++) out[v] *= (float)(w / n);
             }

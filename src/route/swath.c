@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ACROSS = 64, CELLS = 4 * ACROSS }; // points of a slice, at most; cells about them
+enum { ACROSS = 64, CELLS = 4 * (1 + ACROSS) }; // points of a slice, at most; cells about them
 
 double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
 {
@@ -17,10 +17,12 @@ double bt_swath_water(const bt_planner *p, double tx, double ty, double v)
     return bt_max(d * bt_hypot(x, y) * (x * tx + y * ty), 1e-3 * d * v * v);
 }
 
-/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m².
-/// Between the middles of cells it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a
-/// turn sharper than W/2 a slice ends at its centre. Returns the number of cells.
-static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[CELLS], double area[CELLS])
+/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m²; the
+/// first *middle of them are those about its centre, and stand for lengths of the path, m. Between the middles of cells
+/// it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a turn sharper than W/2 a slice
+/// ends at its centre. Returns the number of cells.
+static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, int64_t cell[CELLS], double area[CELLS],
+                 int *middle)
 {
     const bt_route_ice *r = &p->ice;
     const double w = p->task.width, inv = 1 / r->cell;
@@ -30,8 +32,10 @@ static int slice(const bt_planner *p, const bt_leg *leg, double s, double ds, in
     bt_leg_at(leg, s, place, tangent);
     bt_route_ice_place(r, place[0], place[1], at);
     const double t[2] = {tangent[0] * r->ax + tangent[1] * r->ay, tangent[1] * r->ax - tangent[0] * r->ay};
-    for (int k = 0; k < n; k++) {
-        const double aside = w * ((k + 0.5) / n - 0.5), here = ds * w / n * bt_max(0, 1 - leg->turn * aside);
+    for (int k = -1; k < n; k++) {
+        const double aside = k < 0 ? 0 : w * ((k + 0.5) / n - 0.5);
+        const double here = k < 0 ? ds : ds * w / n * bt_max(0, 1 - leg->turn * aside);
+        if (k == 0) *middle = made;
         const double x = at[0] - aside * inv * t[1] - 0.5, y = at[1] + aside * inv * t[0] - 0.5;
         if (!(x >= 0 && y >= 0 && x < r->nx - 1 && y < r->ny - 1)) continue;
         const int64_t i = (int64_t)x, j = (int64_t)y, c = j * r->nx + i;
@@ -55,9 +59,10 @@ void bt_swath_load(const bt_planner *p, const bt_leg *leg, double length, double
     int64_t cell[CELLS];
     double area[CELLS];
     for (int k = 0; k < n; k++) {
-        const int across = slice(p, leg, (k + 0.5) * length / n, length / n, cell, area);
+        int middle;
+        const int across = slice(p, leg, (k + 0.5) * length / n, length / n, cell, area, &middle);
         for (int a = 0; a < across; a++) {
-            const float *load = p->ice.load + cell[a] * n_speeds;
+            const float *load = (a < middle ? p->ice.line : p->ice.load) + cell[a] * n_speeds;
             for (int v = 0; v < n_speeds; v++) sums[v] += area[a] * load[v];
         }
     }
@@ -314,10 +319,12 @@ void bt_swath_report(const bt_planner *p, bt_route *r)
             int64_t cell[CELLS];
             double area[CELLS], at[2], tan[2], term[BT_ROUTE_TERMS];
             const double way = (k + 0.5) * o->length / n;
-            const int across = slice(p, &leg, way, o->length / n, cell, area);
+            int middle;
+            const int across = slice(p, &leg, way, o->length / n, cell, area, &middle);
             for (int a = 0; a < across; a++) {
                 bt_route_ice_terms(&p->ice, &p->task, cell[a], o->speed, term);
-                for (int m = 1; m < BT_ROUTE_TERMS; m++) r->term[m] += area[a] * term[m] / r->length;
+                for (int m = 1; m < BT_ROUTE_TERMS; m++)
+                    if ((a < middle) == (m == BT_ROUTE_LARGE)) r->term[m] += area[a] * term[m] / r->length;
             }
             bt_leg_at(&leg, way, at, tan);
             r->term[0] += bt_swath_water(p, tan[0], tan[1], o->speed) * o->length / n / r->length;

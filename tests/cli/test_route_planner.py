@@ -248,22 +248,53 @@ def test_the_ice_of_a_bend_is_that_of_a_ring():
 
 
 def test_terms_of_the_force():
-    """One large floe, wider than the berg, of which every term has a closed form. Red: a cap that is none; D by W."""
+    """One large floe, wider than the berg, of which every term has a closed form. Red: a cap that is none."""
     ice = dict(outlines=[box(-2000, -2000, 3000, 3000)], thickness=[1.0], added_mass=0.5)
-    extent, size = (0, 0, 1000, 1000), math.sqrt(4 * 25e6 / math.pi)
+    extent, a = (0, 0, 1000, 1000), 5000 / math.sqrt(3)  # the circle of the same second moments
     r = straight_route(Ice(**ice), BERG, (100, 500), (900, 500), speed=1, extent=extent)
-    f1 = 1.5 * 910 * 20
-    np.testing.assert_allclose([r.features[k] for k in ("water", "plough", "compaction", "large")],
-                               [1e4, f1, 9 * f1, f1 * (size / 20 - 1)], rtol=1e-5)
+    f1, u = 1.5 * 910 * 20, 400 / (a + 10)
+    middle = 1.5 * 910 * 25e6 * a / (a + 10) * 2 / math.pi / (a + 10)
+    large = middle * (math.asin(u) + u * math.sqrt(1 - u * u)) / (2 * u)
+    np.testing.assert_allclose([r.features[k] for k in ("water", "plough", "large")], [1e4, f1, large], rtol=1e-5)
+    x = (np.arange(1000) - 499.5) / (a + 10)  # the average is that of the whole extent
+    about = middle * np.sqrt(1 - x ** 2 - x[:, None] ** 2).mean()
+    assert math.isclose(r.features["compaction"], 9 * (f1 + about), rel_tol=1e-5)
     q = 5 * 910 * (1 - 910 / 1027) * 9.81  # kappa 10
     r = straight_route(Ice(**ice, rafting=q), BERG, (100, 500), (900, 500), speed=1, extent=extent)
     f = r.features
     assert math.isclose(f["plough"] + f["compaction"] + f["large"], 20 * q, rel_tol=1e-5)
     assert math.isclose(f["rafting"], 20 * q, rel_tol=1e-5) and math.isclose(r.force, 1e4 + 20 * q, rel_tol=1e-5)
-    # half the cover in strips across: compaction as packed ice of one dimension
-    strips = [box(x, -100, x + 4, 1100) for x in range(-100, 1100, 8)]
-    r = straight_route(Ice(strips, np.ones(len(strips))), BERG, (100, 500), (900, 500), speed=1, extent=extent, cell=1)
-    assert math.isclose(r.features["compaction"] / r.features["plough"], 1 / (1 - 0.5 / 0.84) - 1, rel_tol=0.05)
+    # half the cover in small squares: compaction as packed ice of one dimension, of what is about a lane too
+    squares = [box(x, y, x + 4, y + 2) for x in range(0, 400, 8) for y in range(0, 200, 2) if abs(y - 99) > 12]
+    r = straight_route(Ice(squares, np.ones(len(squares))), BERG, (100, 100), (300, 100), speed=1,
+                       extent=(0, 0, 400, 200), cell=1)
+    f, cover = r.features, 0.5 * (47 - 24) / 47  # of a square of 47 m, 24 m of which are the lane
+    near = 910 * cover * (20 + 4 / 3 * math.sqrt(4 * 2 / 3))  # whole floes: 4/3 of the mean half axis
+    assert f["plough"] == 0 and math.isclose(f["compaction"] / near, 1 / (1 - cover / 0.84) - 1, rel_tol=0.05)
+
+
+@pytest.mark.parametrize("radius, offset", [(40, 0), (40, 45), (40, 52), (10, 12)])
+def test_a_floe_takes_the_momentum_of_an_oblique_collision(radius, offset):
+    """A round floe of the mass m beside the way: m V2 (1 - b2/(r + W/2)2), of which the share r/(r + W/2) is not in the
+    swath; the same from every side. Red: a profile over the floe alone; a law along the axes of the raster."""
+    reach = radius + 10
+    exact = 910 * math.pi * radius ** 2 * radius / reach * 4 * max(0, 1 - (offset / reach) ** 2)
+    for angle in 0, 0.4, 2.1:
+        t = np.array([math.cos(angle), math.sin(angle)])
+        ice = Ice([disc(*(np.array([300, 300]) + offset * np.array([-t[1], t[0]])), radius)], [1.0])
+        r = straight_route(ice, BERG, 300 - 200 * t, 300 + 200 * t, speed=2, extent=(0, 0, 600, 600),
+                           cell=1)
+        assert math.isclose(r.features["large"] * 400, exact, rel_tol=0.01)
+
+
+def test_a_long_floe_reaches_as_far_as_it_is_long():
+    """A floe of 400 by 20 m, aslant: none of it where the way passes beside it, all of it across. Red: a disc."""
+    t = np.array([math.cos(0.5), math.sin(0.5)])
+    n, middle = np.array([-t[1], t[0]]), np.array([400.0, 300.0])
+    long = np.array([middle + a * 200 * t + b * 10 * n for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    beside, across = (straight_route(Ice([long], [1.0]), BERG, middle + o - 150 * d, middle + o + 150 * d, speed=1,
+                                     extent=(0, 0, 800, 600)).features["large"] for o, d in ((30 * n, t), (0 * n, n)))
+    assert beside == 0 < across
 
 
 @pytest.mark.parametrize("headings", [16, 32])

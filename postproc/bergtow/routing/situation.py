@@ -65,6 +65,9 @@ class Place:
 
 def number(text, unit, option):
     """A number with a unit, as the program reads it. Errors: RunError."""
+    if not text.strip():
+        raise RunError(option.strip(), "a number is missing", "write one on each side of a comma; see bergtow route "
+                       "--help", USAGE)
     value = c_double()
     try:
         _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
